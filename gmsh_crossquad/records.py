@@ -1,0 +1,383 @@
+"""The frozen records that the stages hand to each other, in the order of the pipeline.
+
+    Model -> FaceMesh -> CrossField -> AlignedField -> FaceTMesh -> TMesh -> Quotient -> Guide -> QuadMesh
+
+All geometry up to `Guide` is in *scaled* coordinates, ``(x - model.origin) / model.scale``, in which the model's
+bounding box has diagonal 1.  Arrays are rows-first; angles are radians; an index is an integer count of quarter turns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = [
+    "AlignedField",
+    "CrossField",
+    "Curve",
+    "Face",
+    "FaceMesh",
+    "FaceTMesh",
+    "Float",
+    "Guide",
+    "Int",
+    "Model",
+    "QuadMesh",
+    "TMesh",
+]
+
+Float = npt.NDArray[np.float64]
+Int = npt.NDArray[np.int64]
+Bool = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A CAD curve, sampled densely enough to stand for it.
+
+    Attributes
+    ----------
+    tag : int
+        Gmsh tag.
+    start, end : int
+        Rows of `Model.vertices`; equal for a closed curve.  A closed curve without a CAD vertex gets one there.
+    points : (n, 3) float64, scaled
+        From start to end; both end points included, for a closed curve the first is repeated at the end.
+    parameters : (n,) float64
+        CAD parameter of every sample (monotone).
+    arclength : (n,) float64, scaled
+        Cumulative length of the polyline; first 0, last the curve's length.
+    spacing : (d + 1,) float64 or None
+        Arc lengths of the nodes that a Transfinite Curve command prescribes (0 and the length included), else None.
+    """
+
+    tag: int
+    start: int
+    end: int
+    points: Float
+    parameters: Float
+    arclength: Float
+    spacing: Float | None = None
+
+    @property
+    def closed(self) -> bool:
+        return self.start == self.end
+
+    @property
+    def length(self) -> float:
+        return float(self.arclength[-1])
+
+    def at(self, s: Float) -> Float:
+        """Points (k, 3) at arc lengths `s` (k,); periodic on a closed curve, clamped on an open one."""
+        s = np.asarray(s, float)
+        s = np.mod(s, self.length) if self.closed else s
+        return np.stack([np.interp(s, self.arclength, self.points[:, c]) for c in range(3)], axis=-1)
+
+
+@dataclass(frozen=True)
+class Face:
+    """A planar CAD face.
+
+    Attributes
+    ----------
+    tag : int
+    origin : (3,) float64, scaled; axes : (2, 3) float64
+        Orthonormal frame; ``cross(axes[0], axes[1])`` is the CAD normal.  Local coordinates are ``(x - origin) @ axes.T``.
+    loops : tuple of loops, each a tuple of (curve row, +1 or -1)
+        Outer loop first and counter-clockwise in the local frame, holes clockwise: the face is on the left.
+    embedded_curves : tuple of int
+        Rows of `Model.curves` that lie inside the face (cracks, embedded lines).
+    embedded_points : tuple of int
+        Rows of `Model.vertices` inside the face that are on no curve of it.
+    """
+
+    tag: int
+    origin: Float
+    axes: Float
+    loops: tuple[tuple[tuple[int, int], ...], ...]
+    embedded_curves: tuple[int, ...] = ()
+    embedded_points: tuple[int, ...] = ()
+
+    def local(self, points: Float) -> Float:
+        """Local coordinates (n, 2) of scaled points (n, 3)."""
+        out: Float = (np.asarray(points) - self.origin) @ self.axes.T
+        return out
+
+    def world(self, points: Float) -> Float:
+        """Scaled points (n, 3) of local coordinates (n, 2)."""
+        out: Float = self.origin + np.asarray(points) @ self.axes
+        return out
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is needed of the CAD model.
+
+    Attributes
+    ----------
+    name : str
+        Gmsh model name.
+    origin : (3,) float64; scale : float
+        scaled = (x - origin) / scale.
+    vertex_tags : (v,) int64
+        Gmsh point tags of all CAD vertices of the wanted faces, and of embedded points; -1 where a closed curve
+        without vertex got one.
+    vertices : (v, 3) float64, scaled
+    vertex_ports : (v,) bool
+        True where the user asked for a block corner: vertices in a physical group, embedded points.
+    curves : tuple of Curve
+    faces : tuple of Face
+        The faces to mesh: those in physical surfaces where there are any, else all.
+    """
+
+    name: str
+    origin: Float
+    scale: float
+    vertex_tags: Int
+    vertices: Float
+    vertex_ports: Bool
+    curves: tuple[Curve, ...]
+    faces: tuple[Face, ...]
+
+
+@dataclass(frozen=True)
+class FaceMesh:
+    """Background triangles of one face, cut open along embedded curves.
+
+    Attributes
+    ----------
+    face : int
+        Row of `Model.faces`.
+    points : (n, 2) float64
+        Local coordinates.  A point on an embedded curve appears once per side.
+    triangles : (m, 3) int64
+        Counter-clockwise.
+    boundary : (b, 2) int64
+        All boundary half-edges (start, end), the face on the left.  Both sides of an embedded curve are boundary.
+    boundary_curve : (b,) int64
+        Row of `Model.curves`.
+    boundary_arclength : (b, 2) float64
+        Arc length on the curve at start and end of the half-edge (on a closed curve the end of the last
+        half-edge is the length, not 0).
+    vertex : (n,) int64
+        Row of `Model.vertices` or -1.
+    opening_angle : (n,) float64
+        At boundary points that are CAD vertices the angle of this sector from CAD tangents, in (0, 2 pi]; NaN elsewhere.
+    port : (n,) bool
+        True where the layout must have a block corner although the field is regular there.
+    """
+
+    face: int
+    points: Float
+    triangles: Int
+    boundary: Int
+    boundary_curve: Int
+    boundary_arclength: Float
+    vertex: Int
+    opening_angle: Float
+    port: Bool
+
+
+@dataclass(frozen=True)
+class CrossField:
+    """A cross field in Crouzeix–Raviart form.
+
+    Attributes
+    ----------
+    theta : (e,) float64
+        Angle of the cross at every edge midpoint, from the edge's direction (lower to higher vertex), modulo pi/2.
+    rotation : (m, 3) float64
+        Real rotation of the cross from edge k to edge k + 1 of every triangle (counter-clockwise); all integers live here.
+    """
+
+    theta: Float
+    rotation: Float
+
+
+@dataclass(frozen=True)
+class AlignedField:
+    """A boundary-aligned cross field whose singularities are at vertices.
+
+    Attributes
+    ----------
+    field : CrossField
+    index : (n,) int64
+        Index of every vertex in quarter turns; nonzero interior entries are singularities.  At a boundary vertex the
+        sector holds 2 - index quads.
+    periods : (loops,) int64
+        Free integer that was chosen for every boundary loop (0 for the first).
+    flux : (loops,) float64
+        Closed integral of the normal derivative of the angle around every loop.
+    residual : float
+        Greatest misalignment on the boundary, radians.
+    """
+
+    field: CrossField
+    index: Int
+    periods: Int
+    flux: Float
+    residual: float
+
+
+@dataclass(frozen=True)
+class FaceTMesh:
+    """The T-mesh (motorcycle graph) of one face.
+
+    Attributes
+    ----------
+    face : int
+    position : (n, 2) float64
+        Local coordinates of the nodes.
+    vertex : (n,) int64
+        Background vertex of a node (singularities, corners, ports), -1 at T-junctions and ends of traces.
+    index : (n,) int64
+        Index of the node in quarter turns (0 where `vertex` is -1).
+    half_edge : (n,) int64
+        Row of `FaceMesh.boundary` on which a boundary node lies (the half-edge that starts there for a background
+        vertex), -1 in the interior.
+    half_edge_fraction : (n,) float64
+        Place on that half-edge, in [0, 1).
+    arcs : (a, 2) int64
+        Start and end node; boundary arcs run with the face on the left.
+    length : (a,) float64
+    polyline : tuple of (k, 2) float64
+        Local coordinates from start to end.
+    loop : (a,) int64
+        Boundary loop of a boundary arc, -1 for a trace.
+    patches : tuple of four sides, each a tuple of (arc, +1 or -1)
+        Counter-clockwise around the patch; -1 runs an arc from end to start.
+    """
+
+    face: int
+    position: Float
+    vertex: Int
+    index: Int
+    half_edge: Int
+    half_edge_fraction: Float
+    arcs: Int
+    length: Float
+    polyline: tuple[Float, ...]
+    loop: Int
+    patches: tuple[tuple[tuple[tuple[int, int], ...], ...], ...]
+
+
+@dataclass(frozen=True)
+class TMesh:
+    """The T-meshes of all faces, glued along the CAD curves.
+
+    Attributes
+    ----------
+    position : (n, 3) float64, scaled
+    cad_vertex : (n,) int64
+        Row of `Model.vertices`, -1 elsewhere.  Node i is CAD vertex i for the first ``len(model.vertices)`` nodes.
+    curve : (n,) int64; curve_arclength : (n,) float64
+        CAD curve that a node is on (-1: none, or a CAD vertex) and where.
+    critical : (n,) bool
+        Nodes that must stay apart: CAD vertices, singularities, boundary nodes with an index, ports.
+    quads_at : dict of (face row, node) -> int
+        Number of quads that face has around a critical node (all its sectors together).
+    arcs : (a, 2) int64; length : (a,) float64; polyline : tuple of (k, 3) float64
+    arc_curve : (a,) int64; arc_start : (a,) float64
+        CAD curve that an arc is a piece of, or -1, and the arc length where it starts; pieces run with the curve.
+    pieces : tuple of tuple of int
+        For every CAD curve its arcs in order.
+    patches : tuple of four sides, each a tuple of (arc, +1 or -1)
+    patch_face : (p,) int64
+    loops : tuple of (face row, tuple of arcs)
+        Every boundary loop of every face (after cutting along embedded curves).
+    euler : (f,) int64
+        Euler characteristic of every face, not cut.
+    """
+
+    position: Float
+    cad_vertex: Int
+    curve: Int
+    curve_arclength: Float
+    critical: Bool
+    quads_at: dict[tuple[int, int], int]
+    arcs: Int
+    length: Float
+    polyline: tuple[Float, ...]
+    arc_curve: Int
+    arc_start: Float
+    pieces: tuple[tuple[int, ...], ...]
+    patches: tuple[tuple[tuple[tuple[int, int], ...], ...], ...]
+    patch_face: Int
+    loops: tuple[tuple[int, tuple[int, ...]], ...]
+    euler: Int
+
+
+@dataclass(frozen=True)
+class Guide:
+    """The guide grid: a coarse, smoothed quad mesh that carries the layout's geometry.
+
+    Attributes
+    ----------
+    points : (n, 3) float64, scaled
+    curve : (n,) int64
+        CAD curve that the vertex slides on, -1 in the interior and at CAD vertices.
+    arclength : (n,) float64
+        Place on that curve.
+    fixed : (n,) bool
+        Vertices that must not move: CAD vertices, prescribed places (Transfinite), embedded points.
+    cad_vertex : (n,) int64
+        Row of `Model.vertices` or -1.
+    quads : (q, 4) int64
+        Counter-clockwise in the frame of their face.
+    quad_face : (q,) int64
+    quad_block : (q,) int64
+        Coarse block (unit cell of the conforming layout) that the quad belongs to.
+    quad_size : (q, 2) float64
+        Rest lengths along sides 0/2 and 1/3, from the T-mesh.
+    chains : tuple of (k + 1,) int64
+        For every CAD curve its vertices in order (closed: first repeated at the end).
+    """
+
+    points: Float
+    curve: Int
+    arclength: Float
+    fixed: Bool
+    cad_vertex: Int
+    quads: Int
+    quad_face: Int
+    quad_block: Int
+    quad_size: Float
+    chains: tuple[Int, ...]
+
+
+@dataclass(frozen=True)
+class QuadMesh:
+    """The final mesh, in the user's coordinates.
+
+    Attributes
+    ----------
+    points : (n, 3) float64
+        In the user's units.
+    quads : (q, 4) int64
+        Oriented as their CAD face.
+    quad_face : (q,) int64
+        Row of `Model.faces`.
+    quad_block : (q,) int64
+    vertex_node : (v,) int64
+        Node of every CAD vertex.
+    curve_nodes : tuple of (k + 1,) int64
+        Nodes of every CAD curve in order.
+    curve_parameters : tuple of (k + 1,) float64
+        Their CAD parameters.
+    face_nodes : tuple of (k,) int64
+        Nodes inside every face (on no curve and no vertex).
+    notes : tuple of str
+        What the user should know (fall-backs that were taken).
+    """
+
+    points: Float
+    quads: Int
+    quad_face: Int
+    quad_block: Int
+    vertex_node: Int
+    curve_nodes: tuple[Int, ...]
+    curve_parameters: tuple[Float, ...]
+    face_nodes: tuple[Int, ...]
+    notes: tuple[str, ...] = field(default=())
