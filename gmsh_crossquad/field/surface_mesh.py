@@ -202,6 +202,42 @@ class SurfaceMesh:
             if h < 0 or h == first:
                 return out
 
+    def neighbours(self, vertex: int) -> list[int]:
+        """Vertices around `vertex`, counter-clockwise, from its `some_half_edge` on."""
+        star = self.star(vertex)
+        out = [int(self.triangles[h // 3, (h % 3 + 1) % 3]) for h in star]
+        if self.boundary_vertex[vertex]:
+            out.append(int(self.triangles[star[-1] // 3, (star[-1] % 3 + 2) % 3]))
+        return out
+
+    def half_edge_between(self, start: int, end: int) -> int:
+        """The half-edge from `start` to `end`, -1 if no triangle has it."""
+        for h in self.star(start):
+            if self.triangles[h // 3, (h % 3 + 1) % 3] == end:
+                return h
+        return -1
+
+    @cached_property
+    def components(self) -> Int:
+        """(n,) connected component of every vertex, numbered by lowest vertex."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        n = len(self.points)
+        graph = coo_matrix((np.ones(len(self.edges)), (self.edges[:, 0], self.edges[:, 1])), (n, n))
+        label = connected_components(graph, directed=False)[1]
+        first = np.unique(label, return_index=True)[1]
+        return np.argsort(np.argsort(first))[label].astype(np.int64)
+
+    @cached_property
+    def component_euler(self) -> Int:
+        """(c,) Euler characteristic of every component."""
+        label = self.components
+        count = int(label.max()) + 1
+        vertices = np.bincount(label, minlength=count)
+        edges = np.bincount(label[self.edges[:, 0]], minlength=count)
+        return vertices - edges + np.bincount(label[self.triangles[:, 0]], minlength=count)
+
     @cached_property
     def euler(self) -> int:
         """Euler characteristic."""

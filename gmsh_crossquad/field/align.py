@@ -1,0 +1,218 @@
+"""Rotate a cross field until it is aligned with the boundary and as smooth as its singularities allow.
+
+The aligned field is ``theta + x`` with one unknown x per edge.  Along a boundary loop, the domain on the left, it turns at
+vertex v by ``K_v - (pi/2) q_v`` (K_v = pi minus the angle, q_v the wanted index); summed over the loop this must equal what
+the field does:
+
+1. The *defect* ``D_i = target_i - degree_i`` (quarter turns) of a loop vanishes after moving D_i quarter turns of index along
+   a path from the outer loop to the hole (an integer cocycle in `rotation`).  All defects of a component add up to 0, or the
+   wanted indices contradict Poincaré–Hopf.
+2. x is then known on every boundary edge up to one constant per loop, a multiple ``m_i pi/2`` (0 on the outer loop), and
+   inside it minimises ``1/2 sum w (difference(x) + rotation)^2``.
+3. The integers m minimise the same energy, ``1/2 (pi/2)^2 m'Am + (pi/2) g.m`` with ``A_ij = int grad a_i . grad a_j`` for a_i
+   harmonic, 1 on loop i and 0 on the others, and g the flux with m = 0: the rounded real minimum, then single steps while
+   they help.
+
+The result has the same interior indices, to the last integer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import LayoutError
+from ..records import AlignedField, CrossField, Float, Int
+from .operators import FieldOperators
+from .singularities import (
+    QUARTER,
+    check_poincare_hopf,
+    corner_rotation,
+    move_index,
+    shortest_path,
+    to_integer,
+    triangle_index,
+    vertex_index,
+)
+from .smooth import wrap
+from .surface_mesh import SurfaceMesh
+
+__all__ = ["Aligner", "align"]
+
+_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """A boundary loop: its vertices, the edge that leaves each, its component, and whether it is that component's first."""
+
+    vertices: Int
+    edges: Int
+    component: int
+    outer: bool
+
+
+def _loops(mesh: SurfaceMesh) -> list[_Loop]:
+    edge = mesh.triangle_edges.ravel()
+    seen: set[int] = set()
+    out = []
+    for vertices in mesh.loops:
+        c = int(mesh.components[vertices[0]])
+        out.append(_Loop(vertices, edge[mesh.outgoing_boundary[vertices]], c, c not in seen))
+        seen.add(c)
+    return out
+
+
+class Aligner:
+    """Aligns fields of one mesh with one set of boundary indices; loops and harmonic functions are found once.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+    operators : FieldOperators
+    boundary_index : (n,) int64
+        Wanted index of every boundary vertex in quarter turns (interior entries are not read).
+    """
+
+    def __init__(self, mesh: SurfaceMesh, operators: FieldOperators, boundary_index: Int) -> None:
+        self.mesh = mesh
+        self.operators = operators
+        self.boundary_index = np.where(mesh.boundary_vertex, boundary_index, 0)
+        self.loops = _loops(mesh)
+        self.turning = mesh.curvature - QUARTER * self.boundary_index
+        self.holes = [i for i, loop in enumerate(self.loops) if not loop.outer]
+        self._basis: tuple[Float, Float] | None = None
+
+    def close(self, rotation: Float) -> Float:
+        """Copy of `rotation` (m, 3) whose degree along every loop is what the boundary indices ask for."""
+        out = rotation.copy()
+        through = corner_rotation(self.mesh, rotation)
+        defect = to_integer(
+            np.array([np.sum(self.turning[p.vertices] - through[p.vertices]) for p in self.loops]) / QUARTER,
+            "the degree of the cross field along a boundary loop",
+        )
+        components = np.array([loop.component for loop in self.loops])
+        total = np.bincount(components, defect)
+        if np.any(total != 0):
+            raise LayoutError(
+                f"boundary indices and singularities do not fit together (off by {int(total[total != 0][0])} quarter turns)",
+                remedy="change the prescribed singularities or boundary indices (Poincaré–Hopf)",
+            )
+        inside = ~self.mesh.boundary_vertex
+        for i in self.holes:
+            if defect[i] == 0:
+                continue
+            outer = next(p for p in self.loops if p.outer and p.component == self.loops[i].component)
+            target = np.zeros(len(self.mesh.points), bool)
+            target[outer.vertices] = True
+            path = shortest_path(self.mesh, self.loops[i].vertices.tolist(), target, inside, len(self.mesh.points))
+            if not path:
+                raise LayoutError(
+                    "no path of edges leads from a hole to the outer boundary", remedy="use a finer background mesh"
+                )
+            move_index(self.mesh, out, path, -int(defect[i]))
+        return out
+
+    def solve(self, theta: Float, closed: Float) -> Float:
+        """(e,) rotation x that aligns `theta` (e,) with m = 0, for a rotation (m, 3) that went through `close`."""
+        through = corner_rotation(self.mesh, closed)
+        boundary = np.zeros(len(self.mesh.edges))
+        for loop in self.loops:
+            v, e = loop.vertices, loop.edges
+            step = self.turning[v] - through[v]
+            boundary[e] = -wrap(theta[e[:1]]) + np.concatenate([[0.0], np.cumsum(step[1:])])
+        return self.operators.solve(boundary, closed)
+
+    def flux(self, rotation: Float) -> Float:
+        """(loops,) closed integral of the normal derivative of the angle around every loop."""
+        reaction = self.operators.divergence(rotation)
+        return np.array([np.sum(reaction[loop.edges]) for loop in self.loops])
+
+    def harmonic(self) -> tuple[Float, Float]:
+        """(e, holes) functions that are 1 on one hole and 0 on all other loops, and their (holes, holes) energies A."""
+        if self._basis is None:
+            one = np.zeros((len(self.mesh.edges), len(self.holes)))
+            for column, i in enumerate(self.holes):
+                one[self.loops[i].edges, column] = 1.0
+            basis = self.operators.solve(one)
+            self._basis = basis, one.T @ (self.operators.stiffness @ basis)
+        return self._basis
+
+    def rotate(self, field: CrossField) -> tuple[CrossField, Int]:
+        """The aligned, harmonic field with the interior indices of `field`, and the chosen integers (loops,)."""
+        closed = self.close(field.rotation)
+        x = self.solve(field.theta, closed)
+        rotation = closed + self.operators.difference(x)
+        periods = np.zeros(len(self.loops), np.int64)
+        if self.holes:
+            basis, energy = self.harmonic()
+            m = _closest(energy, -self.flux(rotation)[self.holes] / QUARTER)
+            if np.any(m):
+                x = x + QUARTER * (basis @ m)
+                rotation = closed + self.operators.difference(x)
+            periods[self.holes] = m
+        return CrossField(wrap(field.theta + x), rotation), periods
+
+    def finish(self, field: CrossField, periods: Int) -> AlignedField:
+        """Check an aligned field and collect its indices."""
+        mesh = self.mesh
+        index = to_integer(vertex_index(mesh, field.rotation), "the index of a vertex")
+        wrong = np.flatnonzero(mesh.boundary_vertex & (index != self.boundary_index))
+        residual = float(np.abs(wrap(field.theta[self.operators.fixed])).max())
+        angle = field.theta[mesh.triangle_edges] + mesh.edge_direction
+        drift = float(np.abs(wrap(np.roll(angle, -1, axis=1) - angle - field.rotation)).max())
+        if len(wrong) or residual > _TOLERANCE or drift > _TOLERANCE or np.any(triangle_index(field.rotation)):
+            raise LayoutError(
+                f"the cross field could not be aligned ({len(wrong)} wrong indices, residual {max(residual, drift):.3g})",
+                remedy="use a finer background mesh",
+            )
+        check_poincare_hopf(mesh, index)
+        return AlignedField(field, index, periods, self.flux(field.rotation), residual)
+
+
+def _closest(energy: Float, right: Float) -> Int:
+    """Integers m (k,) with small ``1/2 m'Am - right.m``: the rounded real minimum, improved by single steps."""
+    m = np.rint(np.linalg.solve(energy, right)).astype(np.int64)
+    slope = energy @ m - right
+    for _ in range(100 + 10 * len(m)):
+        gain = 0.5 * np.diag(energy) - np.abs(slope)
+        i = int(np.argmin(gain))
+        if gain[i] > -1e-9 * energy[i, i]:
+            break
+        step = -int(np.sign(slope[i]))
+        m[i] += step
+        slope += step * energy[:, i]
+    return m
+
+
+def align(mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, boundary_index: Int) -> AlignedField:
+    """Align a cross field with the boundary.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+    operators : FieldOperators
+        Of the same mesh.
+    field : CrossField
+        Singularities at interior vertices (see `snap_to_vertices`); need not be aligned.
+    boundary_index : (n,) int64
+        Wanted index of every boundary vertex in quarter turns.
+
+    Returns
+    -------
+    AlignedField
+        Same interior indices as `field`; harmonic; aligned to rounding error.
+
+    Raises
+    ------
+    LayoutError
+        If the wanted indices contradict Poincaré–Hopf or the result fails its checks.
+    """
+    aligner = Aligner(mesh, operators, boundary_index)
+    inside = ~mesh.boundary_vertex
+    before = to_integer(vertex_index(mesh, field.rotation)[inside], "the index of an interior vertex")
+    result = aligner.finish(*aligner.rotate(field))
+    if np.any(result.index[inside] != before):
+        raise LayoutError("alignment changed a singularity", remedy="report the model")
+    return result

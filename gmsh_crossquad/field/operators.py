@@ -1,0 +1,118 @@
+"""The Crouzeix–Raviart Laplacian on edge midpoints, factored once.
+
+One unknown per edge; in a triangle the unknowns of edges k and k + 1 meet at vertex k + 1 with weight ``2 cot(angle there)``, so
+that ``1/2 sum w (x_{k+1} - x_k)^2`` is exactly the Dirichlet energy of the piecewise linear (per triangle) function.  Values on
+boundary edges are prescribed.  Every problem of the field stage is one of
+
+    min over x of 1/2 sum over corners of w (x_{k+1} - x_k + r)^2,    x given on the boundary,
+
+with one and the same symmetric positive definite matrix.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+from ..records import Float, Int
+from .surface_mesh import SurfaceMesh
+
+__all__ = ["FieldOperators", "factor"]
+
+
+def factor(matrix: sp.csc_matrix) -> Any:
+    """Factor a symmetric positive definite sparse matrix; ``.solve(rhs)`` of the result takes (n,) or (n, k)."""
+    return spl.splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+@dataclass(frozen=True)
+class FieldOperators:
+    """Stiffness matrix, its factors and the solves that all field stages share.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+        With a boundary in every component.
+    """
+
+    mesh: SurfaceMesh
+
+    @cached_property
+    def weight(self) -> Float:
+        """(m, 3) weight of the corner between edges k and k + 1 of every triangle."""
+        return 2.0 / np.tan(np.roll(self.mesh.corner_angle, -1, axis=1))
+
+    @cached_property
+    def free(self) -> Int:
+        """Interior edges."""
+        return np.flatnonzero(~self.mesh.boundary_edge)
+
+    @cached_property
+    def fixed(self) -> Int:
+        """Boundary edges."""
+        return np.flatnonzero(self.mesh.boundary_edge)
+
+    @cached_property
+    def stiffness(self) -> sp.csr_matrix:
+        """(e, e) stiffness matrix."""
+        i = self.mesh.triangle_edges.ravel()
+        j = np.roll(self.mesh.triangle_edges, -1, axis=1).ravel()
+        w, n = self.weight.ravel(), len(self.mesh.edges)
+        rows, cols = np.concatenate([i, j, i, j]), np.concatenate([i, j, j, i])
+        return sp.coo_matrix((np.concatenate([w, w, -w, -w]), (rows, cols)), (n, n)).tocsr()
+
+    @cached_property
+    def inner(self) -> sp.csc_matrix:
+        """The stiffness among interior edges."""
+        return self.stiffness[self.free][:, self.free].tocsc()
+
+    @cached_property
+    def coupling(self) -> sp.csr_matrix:
+        """The stiffness between interior (rows) and boundary edges (columns)."""
+        return self.stiffness[self.free][:, self.fixed]
+
+    @cached_property
+    def _factors(self) -> Any:
+        return factor(self.inner)
+
+    def difference(self, x: Float) -> Float:
+        """(m, 3) value on edge k + 1 minus value on edge k."""
+        y = x[self.mesh.triangle_edges]
+        return np.roll(y, -1, axis=1) - y
+
+    def divergence(self, r: Float) -> Float:
+        """(e,) adjoint of `difference` with the weights: ``sum_corners w r difference(x) = x @ divergence(r)``."""
+        flow = self.weight * r
+        return np.bincount(self.mesh.triangle_edges.ravel(), (np.roll(flow, 1, axis=1) - flow).ravel(), len(self.mesh.edges))
+
+    def solve(self, boundary_values: Float, correction: Float | None = None) -> Float:
+        """Minimise ``1/2 sum w (difference(x) + correction)^2`` with `x` given on the boundary.
+
+        Parameters
+        ----------
+        boundary_values : (e,) or (e, k) float64
+            Only the entries of boundary edges are read.
+        correction : (m, 3) float64, optional
+            The same for all k columns.
+
+        Returns
+        -------
+        (e,) or (e, k) float64
+        """
+        x = np.zeros_like(boundary_values)
+        x[self.fixed] = boundary_values[self.fixed]
+        right = -(self.coupling @ x[self.fixed])
+        if correction is not None:
+            load = -self.divergence(correction)[self.free]
+            right += load if right.ndim == 1 else load[:, None]
+        x[self.free] = self._factors.solve(right)
+        return x
+
+    def energy(self, rotation: Float) -> float:
+        """Dirichlet energy ``1/2 integral |grad theta|^2`` of a field with this rotation (m, 3) between edges."""
+        return 0.5 * float(np.sum(self.weight * rotation * rotation))
