@@ -1,0 +1,207 @@
+"""From the current Gmsh model to the `Model` record.
+
+The user's model and mesh are only read.  Wanted are the faces in physical surfaces where there are any, else all.
+Coordinates are scaled by the box of the curve samples (Gmsh's own box is loose for OpenCASCADE shapes), so that the
+same tolerances hold from nanometres to megametres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import gmsh
+import numpy as np
+
+from gmsh_crossquad.cad.loops import boundary_loops
+from gmsh_crossquad.cad.plane import face_plane
+from gmsh_crossquad.cad.sample import refine, sample
+from gmsh_crossquad.cad.session import gmsh_errors
+from gmsh_crossquad.cad.transfinite import transfinite_spacing
+from gmsh_crossquad.errors import GeometryError
+from gmsh_crossquad.options import MeshOptions
+from gmsh_crossquad.records import Curve, Face, Float, Model
+
+__all__ = ["read_model"]
+
+COINCIDENT = 1e-12  # of the model: shorter closed curves are degenerate
+
+
+@dataclass
+class _Raw:
+    """A curve in the user's coordinates."""
+
+    tag: int
+    ends: list[int]
+    parameters: Float
+    points: Float
+
+
+@dataclass
+class _Vertices:
+    """Rows of the CAD vertices, in the order in which they are met."""
+
+    tags: list[int] = field(default_factory=list)
+    points: list[Float] = field(default_factory=list)
+    row: dict[int, int] = field(default_factory=dict)
+
+    def cad(self, tag: int) -> int:
+        """Row of Gmsh point `tag`."""
+        if tag not in self.row:
+            self.row[tag] = self.made(np.array(gmsh.model.getValue(0, tag, [])), tag)
+        return self.row[tag]
+
+    def made(self, point: Float, tag: int = -1) -> int:
+        """Row of a new vertex."""
+        self.tags.append(tag)
+        self.points.append(point)
+        return len(self.tags) - 1
+
+
+def read_model(options: MeshOptions) -> Model:
+    """Read the current Gmsh model.
+
+    Parameters
+    ----------
+    options : MeshOptions
+
+    Returns
+    -------
+    Model
+
+    Raises
+    ------
+    GeometryError
+        No surfaces, a face that is not planar, a boundary that does not close.
+    MeshError
+        Where Gmsh fails on an entity.
+    """
+    del options  # nothing that is read depends on them so far
+    with gmsh_errors("reading the model"):
+        tags = _wanted_faces()
+        bounds = {f: [abs(c) for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=True)] for f in tags}
+        signs = {f: [c for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=True)] for f in tags}
+        embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
+    for f in tags:
+        if not bounds[f]:
+            remedy = "gmsh.model.mesh.createTopology() makes the boundaries of a mesh"
+            raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
+    inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
+    curve_tags = list(dict.fromkeys(c for f in tags for c in bounds[f] + inside[f]))
+    vertices = _Vertices()
+    raw = [_read_curve(c, vertices) for c in curve_tags]
+    points = {f: [vertices.cad(p) for d, p in embedded[f] if d == 0] for f in tags}
+    lo, hi = _box([r.points for r in raw])
+    scale = float(np.linalg.norm(hi - lo))
+    if not scale > 0:
+        raise GeometryError("the surface has no extent", entity=(2, tags[0]), remedy="remove it")
+    for r in raw:
+        r.parameters, r.points = refine(r.tag, r.parameters, r.points, scale)
+    lo, hi = _box([r.points for r in raw])
+    origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
+    kept = [r for r in raw if not _degenerate(r, scale)]
+    spacing = transfinite_spacing([r.tag for r in kept])
+    curves = tuple(_curve(r, origin, scale, spacing.get(r.tag)) for r in kept)
+    row = {c.tag: i for i, c in enumerate(curves)}
+    place = np.array(vertices.points).reshape(-1, 3)
+    faces = tuple(
+        _face(
+            f,
+            [c for c in signs[f] if abs(c) in row],
+            [row[c] for c in inside[f] if c in row],
+            points[f],
+            curves,
+            row,
+            place,
+            origin,
+            scale,
+        )
+        for f in tags
+    )
+    groups = {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
+    asked = groups | {vertices.tags[p] for f in tags for p in points[f]}
+    return Model(
+        name=gmsh.model.getCurrent(),
+        origin=origin,
+        scale=scale,
+        vertex_tags=np.array(vertices.tags, np.int64),
+        vertices=(place - origin) / scale,
+        vertex_ports=np.array([t in asked for t in vertices.tags], bool),
+        curves=curves,
+        faces=faces,
+    )
+
+
+def _wanted_faces() -> list[int]:
+    """Tags of the faces to mesh, ascending."""
+    if not gmsh.model.getEntities():
+        gmsh.model.occ.synchronize()
+        gmsh.model.geo.synchronize()
+    groups = gmsh.model.getPhysicalGroups(2)
+    tags = {abs(int(f)) for d, t in groups for f in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
+    tags = tags or {int(f) for _, f in gmsh.model.getEntities(2)}
+    if not tags:
+        raise GeometryError("no surfaces in the model", remedy="add a surface, for example a Plane Surface of a Curve Loop")
+    return sorted(tags)
+
+
+def _box(points: list[Float]) -> tuple[Float, Float]:
+    if not points:
+        raise GeometryError("no curves in the model", remedy="draw the boundary of its surfaces")
+    return np.min([p.min(0) for p in points], 0), np.max([p.max(0) for p in points], 0)
+
+
+def _read_curve(tag: int, vertices: _Vertices) -> _Raw:
+    """First samples of a curve, between its CAD vertices."""
+    parameters, points = sample(tag)
+    with gmsh_errors("reading", entity=(1, tag)):
+        tags = [int(p) for _, p in gmsh.model.getBoundary([(1, tag)], combined=False, oriented=False)]
+        ends = [vertices.cad(p) for p in tags]
+    if not ends:
+        ends = [vertices.made(points[0])]
+    if len(ends) == 1:
+        ends = ends * 2
+    first, last = vertices.points[ends[0]], vertices.points[ends[1]]
+    apart = [np.linalg.norm(points[i] - p) for i, p in ((0, first), (-1, last), (0, last), (-1, first))]
+    if apart[2] + apart[3] < apart[0] + apart[1]:
+        ends, first, last = ends[::-1], last, first
+    points[0], points[-1] = first, last
+    return _Raw(tag, ends, parameters, points)
+
+
+def _degenerate(raw: _Raw, scale: float) -> bool:
+    """A closed curve without extent, as at the pole of a sphere."""
+    return raw.ends[0] == raw.ends[1] and bool(np.ptp(raw.points, axis=0).max() <= COINCIDENT * scale)
+
+
+def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Curve:
+    points = (raw.points - origin) / scale
+    arclength = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(1)))])
+    if spacing is not None:
+        spacing = np.interp(spacing, raw.parameters, arclength)
+    return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing)
+
+
+def _face(
+    tag: int,
+    signed: list[int],
+    inside: list[int],
+    points: list[int],
+    curves: tuple[Curve, ...],
+    row: dict[int, int],
+    place: Float,
+    origin: Float,
+    scale: float,
+) -> Face:
+    """The record of one face; `place` holds the vertices in the user's coordinates."""
+    rows = [row[abs(c)] for c in signed]
+    if not rows:
+        raise GeometryError("the surface has no boundary of any length", entity=(2, tag), remedy="remove it")
+    oriented = [(curves[r].points if c > 0 else curves[r].points[::-1]) for c, r in zip(signed, rows)]
+    centre, axes = face_plane(tag, oriented, origin, scale)
+    face = Face(tag, centre, axes, ())
+    flat = {r: face.local(curves[r].points) for r in dict.fromkeys(rows)}
+    loops, both = boundary_loops(rows, curves, flat, tag, place)
+    embedded = tuple(dict.fromkeys([*both, *inside]))
+    on_curves = {v for c in [*rows, *embedded] for v in (curves[c].start, curves[c].end)}
+    free = tuple(p for p in dict.fromkeys(points) if p not in on_curves)
+    return Face(tag, centre, axes, loops, embedded, free)
