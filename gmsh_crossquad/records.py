@@ -51,6 +51,9 @@ class Curve:
         Cumulative length of the polyline; first 0, last the curve's length.
     spacing : (d + 1,) float64 or None
         Arc lengths of the nodes that a Transfinite Curve command prescribes (0 and the length included), else None.
+    tangents : (2, 3) float64 or None
+        Unit directions from the CAD in which the curve leaves its start and its end, both pointing into the curve;
+        None: those of the samples.
     """
 
     tag: int
@@ -60,6 +63,7 @@ class Curve:
     parameters: Float
     arclength: Float
     spacing: Float | None = None
+    tangents: Float | None = None
 
     @property
     def closed(self) -> bool:

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gmsh_crossquad.errors import GeometryError
-from gmsh_crossquad.records import Curve, Float
+from ..errors import GeometryError
+from ..records import Curve, Float
 
 __all__ = ["boundary_loops", "polygon", "signed_area"]
 

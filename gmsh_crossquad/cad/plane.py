@@ -10,9 +10,9 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from gmsh_crossquad.cad.session import gmsh_errors
-from gmsh_crossquad.errors import GeometryError
-from gmsh_crossquad.records import Float
+from .session import gmsh_errors
+from ..errors import GeometryError
+from ..records import Float
 
 __all__ = ["face_plane"]
 

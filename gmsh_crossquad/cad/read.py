@@ -12,14 +12,15 @@ from dataclasses import dataclass, field
 import gmsh
 import numpy as np
 
-from gmsh_crossquad.cad.loops import boundary_loops
-from gmsh_crossquad.cad.plane import face_plane
-from gmsh_crossquad.cad.sample import refine, sample
-from gmsh_crossquad.cad.session import gmsh_errors
-from gmsh_crossquad.cad.transfinite import transfinite_spacing
-from gmsh_crossquad.errors import GeometryError
-from gmsh_crossquad.options import MeshOptions
-from gmsh_crossquad.records import Curve, Face, Float, Model
+from .loops import boundary_loops
+from .plane import face_plane
+from .sample import refine, sample
+from .session import gmsh_errors
+from .tangents import cad_tangents
+from .transfinite import transfinite_spacing
+from ..errors import GeometryError
+from ..options import MeshOptions
+from ..records import Curve, Face, Float, Model
 
 __all__ = ["read_model"]
 
@@ -178,7 +179,8 @@ def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Cur
     arclength = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(1)))])
     if spacing is not None:
         spacing = np.interp(spacing, raw.parameters, arclength)
-    return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing)
+    tangents = cad_tangents(raw.tag, raw.parameters, points)
+    return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing, tangents)
 
 
 def _face(

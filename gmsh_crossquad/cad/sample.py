@@ -11,9 +11,9 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from gmsh_crossquad.cad.session import gmsh_errors
-from gmsh_crossquad.errors import GeometryError
-from gmsh_crossquad.records import Bool, Float, Int
+from .session import gmsh_errors
+from ..errors import GeometryError
+from ..records import Bool, Float, Int
 
 __all__ = ["evaluate", "refine", "sample"]
 

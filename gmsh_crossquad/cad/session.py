@@ -19,10 +19,15 @@ from dataclasses import dataclass
 import gmsh
 import numpy as np
 
-from gmsh_crossquad.errors import MeshError
-from gmsh_crossquad.records import Float, Int
+from ..errors import MeshError
+from ..records import Float, Int
 
-__all__ = ["MeshSnapshot", "gmsh_errors", "guest", "options", "scratch_model"]
+__all__ = ["MeshSnapshot", "gmsh_errors", "guest", "is_running", "options", "scratch_model"]
+
+
+def is_running() -> bool:
+    """Whether somebody has initialised Gmsh."""
+    return bool(gmsh.isInitialized())
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gmsh_crossquad.records import Float
+from ..records import Float
 
 __all__ = ["transfinite_spacing"]
 
