@@ -1,0 +1,195 @@
+"""Divisions of the chords: of the guide grid, and of the final mesh.
+
+Every chord of the coarse complex gets `guide` cells of the guide grid, and every guide cell `fine` final edges along the chord.
+Both follow the local sizes; edges on CAD curves are kept shorter than 1.6 sizes and turn by less than a given angle, and a short
+CAD curve caps the divisions of the chords that end on it.  Prescribed (Transfinite) counts are equalities on sums of chords.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import LayoutError
+from ..records import Float, Int, Model, TMesh
+from .chords import Chords
+
+__all__ = ["ChordDivisions", "Segments", "chord_divisions", "segments"]
+
+GUIDE_TURN = np.radians(35.0)
+LONGEST = 1.6
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Unit segments of all arcs.
+
+    Attributes
+    ----------
+    chord, arc : (s,) int64
+    length : (s,) float64, scaled
+    turning : (s,) float64
+        Total turning of the CAD curve along the segment, radians; 0 inside faces.
+    middle : (s,) float64
+        Arc length of the middle on the CAD curve (curves only).
+    """
+
+    chord: Int
+    arc: Int
+    length: Float
+    turning: Float
+    middle: Float
+
+
+@dataclass(frozen=True)
+class ChordDivisions:
+    """Guide cells per chord and final edges per guide cell, (n,) int64 each."""
+
+    guide: Int
+    fine: Int
+
+
+def segments(model: Model, tmesh: TMesh, divisions: Int, chords: Chords) -> Segments:
+    """The unit segments of every arc with their lengths and turning."""
+    chord = np.concatenate(chords.arc_segments) if len(chords.arc_segments) else np.zeros(0, np.int64)
+    arc = np.repeat(np.arange(len(divisions)), divisions)
+    within = np.concatenate([np.arange(n) for n in divisions.tolist()]) if len(divisions) else np.zeros(0)
+    n = divisions[arc]
+    length = tmesh.length[arc] / n
+    middle = tmesh.arc_start[arc] + (within + 0.5) * length
+    turning = np.zeros(len(arc))
+    for c, curve in enumerate(model.curves):
+        mine = np.flatnonzero(tmesh.arc_curve[arc] == c)
+        if len(mine):
+            s, total = cumulative_turning(curve.points, curve.arclength)
+            half = 0.5 * length[mine]
+            turning[mine] = np.interp(middle[mine] + half, s, total) - np.interp(middle[mine] - half, s, total)
+    return Segments(chord, arc, length, turning, middle)
+
+
+def cumulative_turning(points: Float, arclength: Float) -> tuple[Float, Float]:
+    """Arc lengths of the segment middles and the total turning of a polyline up to there."""
+    d = np.diff(points, axis=0)
+    norm = np.linalg.norm(d, axis=1)
+    keep = norm > 0
+    d = d[keep] / norm[keep, None]
+    middle = 0.5 * (arclength[1:] + arclength[:-1])[keep]
+    turn = 2 * np.arcsin(np.clip(0.5 * np.linalg.norm(np.diff(d, axis=0), axis=1), 0, 1))
+    return middle, np.concatenate([[0.0], np.cumsum(turn)])
+
+
+def chord_divisions(
+    model: Model,
+    tmesh: TMesh,
+    divisions: Int,
+    chords: Chords,
+    size: Float,
+    guide_size: float,
+    *,
+    finer: Int | None = None,
+) -> ChordDivisions:
+    """Divisions of every chord.
+
+    Parameters
+    ----------
+    divisions : (a,) int64
+        Coarse divisions of the arcs.
+    size : (a,) float64, scaled
+        Target size along every arc.
+    guide_size : float, scaled
+        Smallest useful guide edge; the guide edge is at least the target size.
+    finer : (n,) int64, optional
+        Lower bounds on the guide cells per chord.
+
+    Raises
+    ------
+    LayoutError
+        Prescribed counts of curves contradict each other.
+    """
+    seg = segments(model, tmesh, divisions, chords)
+    n = chords.n
+    on_curve = tmesh.arc_curve[seg.arc] >= 0
+    local = size[seg.arc]
+    coarse = np.maximum(local, guide_size)
+
+    def mean(values: Float) -> Float:
+        weight = np.bincount(seg.chord, minlength=n)
+        return np.bincount(seg.chord, values, minlength=n) / np.maximum(weight, 1)
+
+    def largest(values: Float) -> Float:
+        out = np.zeros(n)
+        np.maximum.at(out, seg.chord, values)
+        return out
+
+    guide = np.maximum(1, np.round(mean(seg.length / coarse))).astype(np.int64)
+    guide = np.minimum(guide, _caps(model, tmesh, divisions, seg, n, coarse))
+    need = np.where(on_curve, np.maximum(seg.length / (LONGEST * coarse), seg.turning / GUIDE_TURN), 0.0)
+    guide = np.maximum(guide, np.ceil(largest(need) - 1e-9).astype(np.int64))
+    if finer is not None:
+        guide = np.maximum(guide, finer)
+    want = mean(seg.length / local)
+    longest = largest(np.where(on_curve, seg.length / (LONGEST * local), 0.0))
+    fine = np.maximum(1, np.round(want / guide))
+    fine = np.maximum(fine, np.ceil(longest / guide - 1e-9)).astype(np.int64)
+    prescribed = {c: len(k.spacing) - 1 for c, k in enumerate(model.curves) if k.spacing is not None}
+    if prescribed:
+        guide, fine = _prescribe(model, tmesh, chords, guide, fine, prescribed)
+    return ChordDivisions(guide, fine)
+
+
+def _caps(model: Model, tmesh: TMesh, divisions: Int, seg: Segments, n: int, size: Float) -> Int:
+    """Upper bounds from short CAD curves: their edges shall not be much shorter than needed."""
+    cap = np.full(n, np.iinfo(np.int64).max)
+    curve = tmesh.arc_curve[seg.arc]
+    for c in range(len(model.curves)):
+        mine = np.flatnonzero(curve == c)
+        if len(mine):
+            limit = max(1, round(model.curves[c].length / len(mine) / (0.3 * float(size[mine].mean()))))
+            np.minimum.at(cap, seg.chord[mine], limit)
+    return cap
+
+
+def _prescribe(
+    model: Model, tmesh: TMesh, chords: Chords, guide: Int, fine: Int, prescribed: dict[int, int]
+) -> tuple[Int, Int]:
+    """Total divisions per chord nearest to the wanted ones whose sums over the prescribed curves are exact."""
+    import scipy.sparse as sp
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    n = chords.n
+    want = (guide * fine).astype(float)
+    row, col = [], []
+    for i, c in enumerate(prescribed):
+        for arc in tmesh.pieces[c]:
+            row += [i] * len(chords.arc_segments[arc])
+            col += chords.arc_segments[arc].tolist()
+    sums = sp.csr_array((np.ones(len(row)), (row, col)), shape=(len(prescribed), n))
+    counts = np.array(list(prescribed.values()), float)
+    eye = sp.eye_array(n, format="csr")
+    zero = sp.csr_array((len(prescribed), n))
+    result = milp(
+        np.concatenate([np.zeros(n), 1.0 / want]),
+        constraints=[
+            LinearConstraint(sp.hstack([sums, zero]), counts, counts),
+            LinearConstraint(sp.hstack([eye, eye]), want, np.inf),
+            LinearConstraint(sp.hstack([eye, -eye]), -np.inf, want),
+        ],
+        integrality=np.concatenate([np.ones(n), np.zeros(n)]),
+        bounds=Bounds(np.concatenate([np.ones(n), np.zeros(n)]), np.inf),
+        options={"mip_rel_gap": 1e-2, "node_limit": 20_000, "time_limit": 30.0},
+    )
+    if result.x is None:
+        tags = ", ".join(f"curve {model.curves[c].tag} ({k})" for c, k in list(prescribed.items())[:8])
+        raise LayoutError(
+            f"the prescribed divisions contradict each other in this layout: {tags}",
+            remedy="change one of the Transfinite Curve counts or leave it out",
+        )
+    total = np.round(result.x[:n]).astype(np.int64)
+    touched = total != guide * fine
+    guide, fine = guide.copy(), fine.copy()
+    for i in np.flatnonzero(touched).tolist():
+        divisors = [d for d in range(1, total[i] + 1) if total[i] % d == 0]
+        best = min(divisors, key=lambda d: (abs(np.log(d / guide[i])), d))
+        guide[i], fine[i] = best, total[i] // best
+    return guide, fine
