@@ -1,0 +1,181 @@
+"""Rest lengths of the guide grid: one per edge, graded over the mesh.
+
+The T-mesh gives every quad the lengths of its sides, constant per patch, with jumps between patches.  Here an edge gets
+one length l, in three steps on u = log l:
+
+1. the mean over the quads at the edge; an edge between two fixed vertices of a curve keeps its true length;
+2. diffusion between neighbours, anchored at step 1:  u <- (ANCHOR u0 + sum u_n) / (ANCHOR + number), where the
+   neighbours are the opposite edges in the quads (across) and the continuing edges at the vertices (along);
+3. where two neighbours still differ by more than `LEAST_RATIO`, both move half of the excess.
+
+Last, on every curve the lengths between two fixed vertices are scaled so that their sum is the arc length there, and in
+every face so that the quads fill its area.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..records import Float, Guide, Int, Model
+from .start import chain_arclengths, grid_edges
+
+__all__ = ["RestLengths", "rest_lengths"]
+
+ANCHOR = 1.0
+SWEEPS = 12
+"""Jacobi sweeps of the diffusion, and of the limiter."""
+LEAST_RATIO = 2.0
+"""Rest lengths of neighbours differ by no more than this factor, where they are free."""
+
+
+@dataclass(frozen=True)
+class RestLengths:
+    """Rest lengths of a guide grid.
+
+    Attributes
+    ----------
+    sides : (4, q) float64
+        Length of the edge from corner k to corner k + 1 of every quad, filling the area of the face.
+    even : (4, q) float64
+        The same for squares of the same area: the geometric mean of the sides.
+    chains : tuple of (k,) float64
+        Lengths of the edges along every curve, adding up to the arc length between its fixed vertices.
+    vertices : (n,) float64
+        Mean length at every vertex.
+    """
+
+    sides: Float
+    even: Float
+    chains: tuple[Float, ...]
+    vertices: Float
+
+
+def rest_lengths(guide: Guide, model: Model) -> RestLengths:
+    """Make the sizes of a guide grid consistent.
+
+    Parameters
+    ----------
+    guide : Guide
+    model : Model
+
+    Returns
+    -------
+    RestLengths
+    """
+    edges, quad_edges = grid_edges(guide.quads)
+    count = np.bincount(quad_edges.ravel(), minlength=len(edges))
+    sides = np.log(guide.quad_size[:, [0, 1, 0, 1]])
+    own = np.bincount(quad_edges.ravel(), sides.ravel(), minlength=len(edges)) / count
+    chain_edges = _chain_edges(guide, edges)
+    held = np.zeros(len(edges), dtype=bool)
+    for row, rows in enumerate(chain_edges):
+        fixed = guide.fixed[guide.chains[row]].copy()
+        if len(fixed):
+            fixed[[0, -1]] = True
+        single = fixed[:-1] & fixed[1:]
+        held[rows[single]] = True
+        own[rows[single]] = np.log(np.diff(chain_arclengths(guide, model, row))[single]) if single.any() else 0.0
+    pairs = _neighbours(guide, edges, quad_edges)
+    length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held))
+    chains = tuple(
+        _fill_chain(length[rows], guide, model, row) if len(rows) else np.zeros(0) for row, rows in enumerate(chain_edges)
+    )
+    for rows, chain in zip(chain_edges, chains):
+        length[rows] = chain
+    per_quad = length[quad_edges].T
+    target = 0.25 * (per_quad[0] + per_quad[2]) * (per_quad[1] + per_quad[3])
+    faces = len(model.faces)
+    wanted = np.bincount(guide.quad_face, target, minlength=faces)
+    actual = np.abs(np.bincount(guide.quad_face, _signed_areas(guide, model), minlength=faces))
+    scale = np.sqrt(np.divide(actual, wanted, out=np.ones(faces), where=(wanted > 0.0) & (actual > 0.0)))[guide.quad_face]
+    ends = edges.ravel()
+    at_vertex = np.bincount(ends, np.repeat(np.log(length), 2), minlength=len(guide.points))
+    degree = np.bincount(ends, minlength=len(guide.points))
+    return RestLengths(
+        sides=per_quad * scale,
+        even=np.tile(np.sqrt(target) * scale, (4, 1)),
+        chains=chains,
+        vertices=np.exp(at_vertex / np.maximum(degree, 1)),
+    )
+
+
+def _chain_edges(guide: Guide, edges: Int) -> list[Int]:
+    """Row of `edges` of every edge of every chain."""
+    base = len(guide.points)
+    keys = edges[:, 0] * base + edges[:, 1]
+    rows = []
+    for chain in guide.chains:
+        ends = np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1)
+        rows.append(np.searchsorted(keys, ends[:, 0] * base + ends[:, 1]))
+    return rows
+
+
+def _neighbours(guide: Guide, edges: Int, quad_edges: Int) -> Int:
+    """Pairs of edges that should have similar lengths (p, 2): opposite in a quad, or continuing at a vertex.
+
+    Two edges continue each other at a vertex if it is regular and they share no quad there; on a curve if they follow
+    each other along it.  Both are found from the quads alone: at an interior vertex of valence 4 every edge meets the
+    other two edges of its two quads once, so its continuation is the sum of all four edges less these and itself.
+    """
+    across = np.concatenate([quad_edges[:, [0, 2]], quad_edges[:, [1, 3]]])
+    n = len(guide.points)
+    corner = guide.quads.ravel()
+    out = quad_edges.ravel()
+    back = np.roll(quad_edges, 1, axis=1).ravel()
+    regular = (np.bincount(corner, minlength=n) == 4) & (guide.cad_vertex < 0)
+    keep = regular[corner]
+    # At (vertex, edge) half-edges: total of the edges around the vertex, and of the edges met through a quad.
+    vertex, one, two = corner[keep], out[keep], back[keep]
+    total = np.bincount(vertex, one, minlength=n)
+    half = np.concatenate([vertex * len(edges) + one, vertex * len(edges) + two])
+    met = np.concatenate([two, one])
+    keys, inverse, times = np.unique(half, return_inverse=True, return_counts=True)
+    at, edge = keys // len(edges), keys % len(edges)
+    other = np.rint(total[at] - np.bincount(inverse, met.astype(float)) - edge).astype(np.int64)
+    good = (times == 2) & (other > edge) & (other < len(edges))
+    along = np.column_stack([edge[good], other[good]])
+    on_curves = [np.column_stack([rows[:-1], rows[1:]]) for rows in _chain_edges(guide, edges)]
+    return np.concatenate([across, along, *on_curves])
+
+
+def _diffuse(own: Float, pairs: Int, held: np.typing.NDArray[np.bool_]) -> Float:
+    n = len(own)
+    i, j = np.concatenate([pairs, pairs[:, ::-1]]).T
+    weight = ANCHOR + np.bincount(i, minlength=n)
+    u = own.copy()
+    for _ in range(SWEEPS):
+        u = np.where(held, own, (ANCHOR * own + np.bincount(i, u[j], minlength=n)) / weight)
+    return u
+
+
+def _limit(u: Float, pairs: Int, held: np.typing.NDArray[np.bool_]) -> Float:
+    free = pairs[~held[pairs].any(axis=1)]
+    i, j = np.concatenate([free, free[:, ::-1]]).T
+    share = 1.0 / (1.0 + np.bincount(i, minlength=len(u)))
+    bound = float(np.log(LEAST_RATIO))
+    for _ in range(SWEEPS):
+        step = u[j] - u[i]
+        excess = step - np.clip(step, -bound, bound)
+        if not excess.any():
+            break
+        u = u + np.bincount(i, excess, minlength=len(u)) * share
+    return u
+
+
+def _fill_chain(length: Float, guide: Guide, model: Model, row: int) -> Float:
+    """Scale the lengths along a curve to the arc length between its fixed vertices."""
+    fixed = guide.fixed[guide.chains[row]].copy()
+    fixed[[0, -1]] = True
+    at = np.flatnonzero(fixed)
+    span = np.diff(chain_arclengths(guide, model, row)[at])
+    return length * np.repeat(span / np.add.reduceat(length, at[:-1]), np.diff(at))
+
+
+def _signed_areas(guide: Guide, model: Model) -> Float:
+    corners = guide.points[guide.quads]
+    normals = np.array([np.cross(*face.axes) for face in model.faces])[guide.quad_face]
+    diagonals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    area: Float = 0.5 * np.einsum("qc,qc->q", diagonals, normals)
+    return area
