@@ -1,0 +1,120 @@
+"""The guide quads as structured grids: positions inside, quality and fine quads.
+
+Cells of equal size are worked on together, as many as fit the cache.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..records import Bool, Float, Guide, Int
+from .coons import coons, grid_quads, grid_quality
+from .numbering import GuideTopology, Numbering, edge_nodes
+from .skeleton import Frames, Skeleton
+
+__all__ = ["Cells"]
+
+CHUNK = 1 << 14  # grid nodes at a time
+
+# corner where each side starts and ends when it runs with u or v
+SIDES = ((0, 1), (1, 2), (3, 2), (0, 3))
+
+
+@dataclass(frozen=True)
+class Cells:
+    """All cells of a guide grid."""
+
+    guide: Guide
+    topology: GuideTopology
+    numbering: Numbering
+    skeleton: Skeleton
+    frames: Frames
+
+    @property
+    def divisions(self) -> Int:
+        """(q, 2) pieces along u (sides 0 and 2) and v (sides 1 and 3)."""
+        return self.numbering.divisions[self.topology.quad_edges[:, :2]]
+
+    def reverse(self, q: Int, side: int) -> Bool:
+        """(m,) True where the edge of `side` runs against u or v."""
+        start = self.guide.quads[q, SIDES[side][0]]
+        out: Bool = self.topology.edges[self.topology.quad_edges[q, side], 0] != start
+        return out
+
+    def groups(self, which: Int) -> Iterator[tuple[Int, int, int]]:
+        """Pieces of `which` with equal divisions: (cells, ku, kv)."""
+        k = self.divisions[which]
+        kinds, kind = np.unique(k[:, 0] * (k.max(initial=0) + 1) + k[:, 1], return_inverse=True)
+        order = np.argsort(kind, kind="stable")
+        bounds = np.searchsorted(kind[order], np.arange(len(kinds) + 1))
+        for i in range(len(kinds)):
+            cells = which[order[bounds[i] : bounds[i + 1]]]
+            ku, kv = self.divisions[cells[0]].tolist()
+            m = max(1, CHUNK // ((ku + 1) * (kv + 1)))
+            for first in range(0, len(cells), m):
+                yield cells[first : first + m], ku, kv
+
+    def corner_quality(self) -> Float:
+        """(q,) least scaled Jacobian of the guide quads themselves."""
+        x = self.frames.local(self.skeleton.vertices[self.guide.quads], self.guide.quad_face)
+        return grid_quality(x[:, :, [0, 3, 1, 2]].reshape(2, -1, 2, 2))
+
+    def place(self, which: Int, points: Float) -> Float:
+        """Fill the cells `which`, write their inner nodes to `points` and return their least scaled Jacobian (m,)."""
+        worst = np.empty(len(self.guide.quads))
+        for q, ku, kv in self.groups(which):
+            face = self.guide.quad_face[q]
+            grid = coons(*(self.frames.local(self._side(q, s, (ku, kv)[s % 2]), face) for s in range(4)))
+            worst[q] = grid_quality(grid)
+            if ku > 1 and kv > 1:
+                inside = grid[:, :, 1:-1, 1:-1].reshape(2, len(q), -1)
+                _put(points, self.numbering.cell_first[q], self.frames.user(inside, face))
+        return worst[which]
+
+    def _side(self, q: Int, side: int, count: int) -> Float:
+        """Positions (m, count + 1, 3) of a side, with u or v."""
+        a, b = SIDES[side]
+        corners = self.guide.quads[q]
+        out = np.empty((len(q), count + 1, 3))
+        out[:, 0] = self.skeleton.vertices[corners[:, a]]
+        out[:, -1] = self.skeleton.vertices[corners[:, b]]
+        if count > 1:
+            e = self.topology.quad_edges[q, side]
+            out[:, 1:-1] = self.skeleton.inside[self.skeleton.rows(e, self.reverse(q, side), count)]
+        return out
+
+    def quads(self) -> Int:
+        """(n_quads, 4) fine quads of all cells."""
+        out = np.empty((self.numbering.n_quads, 4), np.int64)
+        for q, ku, kv in self.groups(self.numbering.cell_order):
+            _put(out, self.numbering.quad_first[q], grid_quads(self.nodes(q, ku, kv)))
+        return out
+
+    def nodes(self, q: Int, ku: int, kv: int) -> Int:
+        """Nodes (m, ku + 1, kv + 1) of cells with equal divisions."""
+        g = np.empty((len(q), ku + 1, kv + 1), np.int64)
+        corner = self.numbering.vertex_id[self.guide.quads[q]]
+        g[:, 0, 0], g[:, -1, 0], g[:, -1, -1], g[:, 0, -1] = corner.T
+        e = self.topology.quad_edges[q]
+        if ku > 1:
+            g[:, 1:-1, 0] = edge_nodes(self.numbering, e[:, 0], self.reverse(q, 0), ku)
+            g[:, 1:-1, -1] = edge_nodes(self.numbering, e[:, 2], self.reverse(q, 2), ku)
+        if kv > 1:
+            g[:, -1, 1:-1] = edge_nodes(self.numbering, e[:, 1], self.reverse(q, 1), kv)
+            g[:, 0, 1:-1] = edge_nodes(self.numbering, e[:, 3], self.reverse(q, 3), kv)
+        if ku > 1 and kv > 1:
+            inside = self.numbering.cell_first[q][:, None] + np.arange((ku - 1) * (kv - 1))
+            g[:, 1:-1, 1:-1] = inside.reshape(len(q), ku - 1, kv - 1)
+        return g
+
+
+def _put(target: Float | Int, first: Int, rows: Float | Int) -> None:
+    """Write blocks of rows (m, k, d) to `target` at the rows that start at `first` (m,)."""
+    k = rows.shape[1]
+    if np.all(np.diff(first) == k):
+        target[first[0] : first[0] + len(first) * k] = rows.reshape(-1, rows.shape[2])
+    else:
+        target[first[:, None] + np.arange(k)] = rows

@@ -1,0 +1,98 @@
+"""Structured grids between four given sides: transfinite interpolation (Coons).
+
+    S(i, j) = (1 - v_j) bottom_i + v_j top_i + (1 - u_i) left_j + u_i right_j - bilinear(u_i, v_j)
+
+with u_i the mean of the relative arc lengths at node i of bottom and top, weighted by their lengths, and v_j likewise: the
+rule of Gmsh's transfinite mesher, to rounding.  Grids of equal size are done together, in pieces that fit the cache.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..records import Float, Int
+
+__all__ = ["coons", "grid_quads", "grid_quality"]
+
+
+def coons(bottom: Float, right: Float, top: Float, left: Float) -> Float:
+    """Fill grids from their sides.
+
+    Parameters
+    ----------
+    bottom, top : (d, m, ku + 1) float64
+        d coordinates of m grids; both run with u.
+    right, left : (d, m, kv + 1) float64
+        Both run with v.
+
+    Returns
+    -------
+    (d, m, ku + 1, kv + 1) float64
+        The sides included.
+    """
+    u, v = _relative_length(bottom, top), _relative_length(left, right)
+    line0 = left[..., :1] + v * (left[..., -1:] - left[..., :1])
+    line1 = right[..., :1] + v * (right[..., -1:] - right[..., :1])
+    bulge = left - line0
+    change = right - line1 - bulge
+    out = v[:, None, :] * (top - bottom)[..., :, None]
+    out += bottom[..., :, None]
+    out += bulge[..., None, :]
+    out += u[:, :, None] * change[..., None, :]
+    # the formula meets the sides up to rounding; they are given, so they are exact
+    out[..., 0] = bottom
+    out[..., -1] = top
+    out[..., 0, :] = left
+    out[..., -1, :] = right
+    return out
+
+
+def _relative_length(a: Float, b: Float) -> Float:
+    """(m, k + 1) relative arc length of two opposite sides (d, m, k + 1), averaged."""
+    out = np.zeros(a.shape[1:])
+    step = np.sqrt((np.diff(a) ** 2).sum(axis=0)) + np.sqrt((np.diff(b) ** 2).sum(axis=0))
+    np.cumsum(step, axis=1, out=out[:, 1:])
+    total = out[:, -1:].copy()
+    # a cell without extent keeps equal steps; its quality is 0 and is reported as such
+    flat = total[:, 0] == 0
+    out[flat] = np.arange(out.shape[1])
+    total[flat] = out.shape[1] - 1
+    out /= total
+    return out
+
+
+def grid_quality(grid: Float) -> Float:
+    """Least scaled Jacobian of planar grids.
+
+    Parameters
+    ----------
+    grid : (2, m, ku + 1, kv + 1) float64
+
+    Returns
+    -------
+    (m,) float64
+        Minimum over all quads and corners of the sine of the corner angle, signed.
+    """
+    du, dv = grid[:, :, 1:] - grid[:, :, :-1], grid[:, :, :, 1:] - grid[:, :, :, :-1]
+    tiny = np.finfo(float).tiny
+    for d in (du, dv):
+        length = np.sqrt(d[0] * d[0] + d[1] * d[1])
+        d /= np.maximum(length, tiny, out=length)
+    worst = np.ones(grid.shape[1])
+    for a in (du[..., :-1], du[..., 1:]):
+        for b in (dv[:, :, :-1], dv[:, :, 1:]):
+            sine = a[0] * b[1]
+            sine -= a[1] * b[0]
+            np.minimum(worst, sine.min(axis=(1, 2)), out=worst)
+    return worst
+
+
+def grid_quads(nodes: Int) -> Int:
+    """Quads (m, ku kv, 4) of grids of nodes (m, ku + 1, kv + 1), u major, counter-clockwise as (u, v)."""
+    m, i, j = nodes.shape
+    out = np.empty((m, i - 1, j - 1, 4), np.int64)
+    out[..., 0] = nodes[:, :-1, :-1]
+    out[..., 1] = nodes[:, 1:, :-1]
+    out[..., 2] = nodes[:, 1:, 1:]
+    out[..., 3] = nodes[:, :-1, 1:]
+    return out.reshape(m, -1, 4)

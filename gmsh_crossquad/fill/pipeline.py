@@ -1,0 +1,152 @@
+"""The final mesh from the smoothed guide grid.
+
+Curves first (exact CAD points, monotone spacing), then the inner guide edges (Hermite cubics), then all cells (Coons).  A
+cubic that bulges too much folds the cells beside it: where a fine quad is worse than half its guide quad, the edges of
+that cell are straightened step by step.  Only cells that touch a changed edge are computed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..errors import InputError, MeshError
+from ..records import Bool, Float, Guide, Int, Model, QuadMesh
+from .cells import Cells
+from .curves import curve_parameters
+from .numbering import guide_chords, guide_topology, number
+from .skeleton import Frames, Skeleton
+from .tangents import continuation, end_tangents
+
+__all__ = ["fill"]
+
+ROUNDS = 6  # of straightening; each halves the bulge
+KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
+POOR = 0.05  # guide quads below this are held to this
+
+
+def fill(
+    model: Model,
+    guide: Guide,
+    divisions: Int,
+    evaluate: Callable[[int, Float], Float],
+    vertices: Float | None = None,
+    *,
+    filler: str = "numpy",
+) -> QuadMesh:
+    """Divide a guide grid.
+
+    Parameters
+    ----------
+    model : Model
+    guide : Guide
+    divisions : (c,) int64
+        Pieces of the edges of every guide chord (`guide_chords`), at least 1.
+    evaluate : callable (curve row, parameters (m,)) -> (m, 3)
+        Exact points of a CAD curve, in the user's coordinates.
+    vertices : (v, 3) float64, optional
+        Exact CAD vertices in the user's coordinates; by default those of `model`.
+    filler : {"numpy", "gmsh"}
+        Who fills the cells.  Both follow the same rule; Gmsh's transfinite mesher takes longer.
+
+    Returns
+    -------
+    QuadMesh
+        Quads are ordered by face and guide quad; nodes by CAD vertex, curve and face.
+
+    Raises
+    ------
+    MeshError
+        A guide quad that is not inverted cannot be filled without inverted quads, or the guide is not conforming.
+    """
+    if filler not in ("numpy", "gmsh"):
+        raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
+    edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
+    if len(divisions) != n_chords:
+        raise MeshError(f"{len(divisions)} divisions for {n_chords} guide chords", remedy="report this model")
+    topology = guide_topology(guide, edges, quad_edges)
+    numbering = number(guide, topology, np.asarray(divisions, np.int64)[chord], len(model.vertices), len(model.faces))
+    pieces = numbering.divisions
+    frames, skeleton = Frames.of(model), Skeleton.start(guide, pieces)
+    points = np.empty((numbering.n_nodes, 3))
+    used = numbering.vertex_node >= 0
+    exact = model.vertices * model.scale + model.origin if vertices is None else vertices
+    points[numbering.vertex_node[used]] = exact[used]
+
+    parameters = []
+    for row, (chain, e, forward) in enumerate(zip(guide.chains, topology.chain_edges, topology.chain_forward)):
+        curve, nodes = model.curves[row], numbering.curve_nodes[row]
+        s = guide.arclength[chain]
+        s[0], s[-1] = 0.0, curve.length
+        t = curve_parameters(curve, s, pieces[e])
+        if len(t) > 2:
+            points[nodes[1:-1]] = evaluate(row, t[1:-1])
+        parameters.append(t)
+        skeleton.put_chain(chain, e, forward, (points[nodes] - model.origin) / model.scale)
+
+    tangents = end_tangents(skeleton.vertices, edges, pieces, continuation(guide.quads, topology))
+    skeleton.put_cubics(np.flatnonzero(~topology.on_curve), edges, tangents)
+    cells = Cells(guide, topology, numbering, skeleton, frames)
+    own = cells.corner_quality()
+    worst = _place(cells, own, tangents, points)
+    _refuse_folds(model, guide, own, worst)
+    skeleton.write(points, guide, numbering, topology, frames)
+    if filler == "gmsh":
+        from .gmsh_fill import gmsh_cells
+
+        for q, inside in enumerate(gmsh_cells(guide.quads, topology, skeleton)):
+            first = numbering.cell_first[q]
+            points[first : first + len(inside)] = inside * model.scale + model.origin
+    return _record(guide, cells, points, tuple(parameters), int(np.count_nonzero(own <= 0)))
+
+
+def _place(cells: Cells, own: Float, tangents: Float, points: Float) -> Float:
+    """Fill all cells, straightening edges beside bad ones; the least scaled Jacobian (q,) of every cell."""
+    topology, skeleton = cells.topology, cells.skeleton
+    edges, quad_edges = topology.edges, topology.quad_edges
+    free = ~topology.on_curve & (skeleton.divisions > 1)
+    worst = cells.place(np.arange(len(quad_edges)), points)
+    for _ in range(ROUNDS):
+        soft: Bool = np.zeros(len(edges), bool)
+        soft[quad_edges[worst < KEEP * np.maximum(own, POOR)]] = True
+        e = np.flatnonzero(soft & free)
+        if len(e) == 0:
+            break
+        chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
+        tangents[e] = 0.5 * (tangents[e] + chord[:, None])
+        skeleton.put_cubics(e, edges, tangents)
+        again = np.flatnonzero(np.any((soft & free)[quad_edges], axis=1))
+        worst[again] = cells.place(again, points)
+    return worst
+
+
+def _refuse_folds(model: Model, guide: Guide, own: Float, worst: Float) -> None:
+    """Raise where fine quads are inverted although their guide quad is not."""
+    folded = np.flatnonzero((worst <= 0) & (own > 0))
+    if len(folded):
+        q = folded[np.argmin(worst[folded])]
+        raise MeshError(
+            f"{len(folded)} cells fold when they are filled",
+            entity=(2, model.faces[guide.quad_face[q]].tag),
+            location=guide.points[guide.quads[q]].mean(axis=0) * model.scale + model.origin,
+            remedy="use a smaller size",
+        )
+
+
+def _record(guide: Guide, cells: Cells, points: Float, parameters: tuple[Float, ...], inverted: int) -> QuadMesh:
+    """Put the parts of the mesh together."""
+    numbering, order = cells.numbering, cells.numbering.cell_order
+    count = cells.divisions.prod(axis=1)[order]
+    notes = (f"{inverted} inverted guide quads were filled as they are",) if inverted else ()
+    return QuadMesh(
+        points,
+        cells.quads(),
+        np.repeat(guide.quad_face[order], count),
+        np.repeat(guide.quad_block[order], count),
+        numbering.vertex_node,
+        numbering.curve_nodes,
+        parameters,
+        numbering.face_nodes,
+        notes,
+    )

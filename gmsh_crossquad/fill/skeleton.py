@@ -1,0 +1,118 @@
+"""Positions of everything that bounds the cells: guide vertices and the nodes inside guide edges, in scaled coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..records import Bool, Float, Guide, Int, Model
+from .numbering import GuideTopology, Numbering
+from .tangents import cubic
+
+__all__ = ["Frames", "Skeleton"]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Planes of all faces.
+
+    Attributes
+    ----------
+    origin : (f, 3) float64, scaled; axes : (f, 2, 3) float64
+    user_origin : (f, 3) float64; user_axes : (f, 2, 3) float64
+        Scaled local coordinates to the user's: ``user_origin + x user_axes[0] + y user_axes[1]``.
+    """
+
+    origin: Float
+    axes: Float
+    user_origin: Float
+    user_axes: Float
+
+    @classmethod
+    def of(cls, model: Model) -> Frames:
+        """Frames of the faces of `model`."""
+        origin = np.array([f.origin for f in model.faces], float).reshape(-1, 3)
+        axes = np.array([f.axes for f in model.faces], float).reshape(-1, 2, 3)
+        return cls(origin, axes, origin * model.scale + model.origin, axes * model.scale)
+
+    def local(self, points: Float, face: Int) -> Float:
+        """Local coordinates (2, m, ...) of scaled points (m, ..., 3), each m in the plane of its face (m,)."""
+        one = (slice(None),) + (None,) * (points.ndim - 2)
+        p = points - self.origin[face][one]
+        axes = self.axes[face]
+        return np.stack([(p * axes[:, d][one]).sum(axis=-1) for d in (0, 1)])
+
+    def user(self, local: Float, face: Int) -> Float:
+        """Points (m, ..., 3) in the user's coordinates of local ones (2, m, ...)."""
+        one = (slice(None),) + (None,) * (local.ndim - 2)
+        origin, axes = self.user_origin[face], self.user_axes[face]
+        out = np.empty((*local.shape[1:], 3))
+        for c in range(3):
+            np.multiply(local[0], axes[:, 0, c][one], out=out[..., c])
+            out[..., c] += local[1] * axes[:, 1, c][one]
+            out[..., c] += origin[:, c][one]
+        return out
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """Guide vertices (n, 3) and the nodes inside guide edges, from the lower vertex, scaled.
+
+    Node j of edge e (1 <= j < divisions) is row ``first[e] + j - 1`` of `inside`.  The arrays are filled in place.
+    """
+
+    vertices: Float
+    inside: Float
+    first: Int
+    divisions: Int
+
+    @classmethod
+    def start(cls, guide: Guide, divisions: Int) -> Skeleton:
+        """Guide vertices where the guide has them; nothing is inside the edges yet."""
+        count = divisions - 1
+        return cls(guide.points.copy(), np.empty((int(np.sum(count)), 3)), np.cumsum(count) - count, divisions)
+
+    def rows(self, edges: Int, reverse: Bool, count: int) -> Int:
+        """Rows (m, count - 1) of `inside`, from the lower vertex or (`reverse`) from the higher."""
+        j = np.arange(1, count)
+        out: Int = self.first[edges][:, None] + np.where(reverse[:, None], count - j, j) - 1
+        return out
+
+    def edge(self, e: int) -> Float:
+        """Nodes (divisions - 1, 3) inside edge `e`, from the lower vertex."""
+        return self.inside[self.first[e] : self.first[e] + self.divisions[e] - 1]
+
+    def put_chain(self, chain: Int, edges: Int, forward: Bool, nodes: Float) -> None:
+        """Put the `nodes` of a whole CAD curve on its guide vertices `chain` and its `edges`."""
+        place = np.concatenate([[0], np.cumsum(self.divisions[edges])])
+        self.vertices[chain[:-1]] = nodes[place[:-1]]
+        self.vertices[chain[-1]] = nodes[-1]
+        owner, j = _ragged(self.divisions[edges] - 1)
+        row = self.first[edges][owner] + np.where(forward[owner], j, self.divisions[edges][owner] - 2 - j)
+        self.inside[row] = nodes[place[owner] + 1 + j]
+
+    def put_cubics(self, which: Int, edges: Int, tangents: Float) -> None:
+        """Put cubics with the given end `tangents` (e, 2, 3) on the edges `which`."""
+        for count in np.unique(self.divisions[which]).tolist():
+            e = which[self.divisions[which] == count]
+            rows = self.rows(e, np.zeros(len(e), bool), count)
+            self.inside[rows] = cubic(self.vertices[edges[e, 0]], self.vertices[edges[e, 1]], tangents[e], count)
+
+    def write(self, points: Float, guide: Guide, numbering: Numbering, topology: GuideTopology, frames: Frames) -> None:
+        """Write what is inside faces to `points`, in the user's coordinates; it lies in its plane."""
+        v = np.flatnonzero((topology.vertex_face >= 0) & (guide.cad_vertex < 0))
+        face = topology.vertex_face[v]
+        points[numbering.vertex_id[v]] = frames.user(frames.local(self.vertices[v], face), face)
+        e = np.flatnonzero(~topology.on_curve)
+        owner, j = _ragged(self.divisions[e] - 1)
+        e = e[owner]
+        face = topology.edge_face[e]
+        local = frames.local(self.inside[self.first[e] + j], face)
+        points[numbering.edge_first[e] + numbering.edge_step[e] * j] = frames.user(local, face)
+
+
+def _ragged(count: Int) -> tuple[Int, Int]:
+    """Owner and place of every item of a ragged array with `count` items per owner."""
+    owner = np.repeat(np.arange(len(count)), count)
+    return owner, np.arange(len(owner)) - (np.cumsum(count) - count)[owner]
