@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gmsh_crossquad.records import Curve, Face, Float, Model
+from gmsh_crossquad.records import Curve, Face, FaceMesh, Float, Model
 
 Loop = Sequence[tuple[int, int]]
 
@@ -246,3 +246,15 @@ def moved(model: Model, angle: float) -> Model:
         vertices=model.vertices @ turn,
         curves=tuple(replace(k, points=k.points @ turn) for k in model.curves),
     )
+
+
+def background(model: Model, h: float = 0.03) -> tuple[FaceMesh, ...]:
+    """Uniform background meshes of edge length `h` (scaled); needs Gmsh."""
+    from gmsh_crossquad.cad.background import face_mesh
+    from gmsh_crossquad.cad.session import guest
+
+    spacing = tuple(
+        np.linspace(0.0, c.length, max(12 if c.closed else 3, int(np.ceil(c.length / h - 1e-9))) + 1) for c in model.curves
+    )
+    with guest():
+        return tuple(face_mesh(model, row, spacing, h) for row in range(len(model.faces)))

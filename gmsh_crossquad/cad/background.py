@@ -1,0 +1,130 @@
+"""The background triangle mesh of every face.
+
+The nodes on the curves are given (`curve_spacing`), the same for all faces of a curve.  Gmsh triangulates every face
+(`triangulate`); the mesh is cut open along embedded curves and where the boundary touches itself (`cut_open`), and split where
+the field would have no room (`open_up`).  The opening angle of every boundary sector at a CAD vertex comes from the directions of
+the two curve ends that bound it, modulo 2 pi; the mesh only tells which representative it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import MeshError
+from ..field.cut import cut_open
+from ..field.split import open_up
+from ..field.surface_mesh import SurfaceMesh
+from ..options import MeshOptions
+from ..records import FaceMesh, Float, Int, Model
+from .outline import Outline, outline
+from .spacing import curve_spacing, face_sizes
+from .tangents import end_directions
+from .triangulate import triangulate
+
+__all__ = ["background_meshes", "face_mesh"]
+
+
+def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...]:
+    """Background meshes of all faces; the current Gmsh model and its mesh stay as they are.
+
+    Parameters
+    ----------
+    model : Model
+    options : MeshOptions
+        `background` is a factor on all sizes.
+
+    Returns
+    -------
+    tuple of FaceMesh
+        One per face, in their order; several components where closed embedded curves divide a face.
+
+    Raises
+    ------
+    MeshError
+        Where a face cannot be triangulated.
+    """
+    spacing = curve_spacing(model, options)
+    sizes = face_sizes(model, options)
+    return tuple(face_mesh(model, row, spacing, float(sizes[row])) for row in range(len(model.faces)))
+
+
+def face_mesh(model: Model, row: int, spacing: tuple[Float, ...], h_max: float) -> FaceMesh:
+    """Background mesh of one face.
+
+    Parameters
+    ----------
+    model : Model
+    row : int
+        Row of the face.
+    spacing : tuple of (k + 1,) float64
+        Arc lengths of the nodes of every curve.
+    h_max : float
+        Greatest size of triangles.
+
+    Raises
+    ------
+    MeshError
+        Where the face cannot be triangulated.
+    """
+    shape = outline(model, row, spacing)
+    points, triangles = triangulate(shape, h_max, model.faces[row].tag)
+    triangles, source = cut_open(triangles, len(points), shape.segments[shape.embedded])
+    points = points[source]
+    vertex = np.where(source < len(shape.vertex), shape.vertex[np.minimum(source, len(shape.vertex) - 1)], -1)
+    on_boundary = SurfaceMesh(points, triangles).boundary_vertex
+    points, triangles = open_up(points, triangles, on_boundary & (vertex >= 0))
+    new = len(points) - len(source)
+    source, vertex = (np.concatenate([a, np.full(new, -1)]) for a in (source, vertex))
+    mesh = SurfaceMesh(points, triangles)
+    boundary, curve, arclength = _boundary(mesh, shape, source, model.faces[row].tag)
+    angle = _opening_angles(model, row, mesh, boundary, curve, arclength, vertex)
+    asked = (vertex >= 0) & model.vertex_ports[np.maximum(vertex, 0)]
+    smooth = np.abs(angle - np.pi) < np.pi / 4
+    return FaceMesh(
+        face=row,
+        points=points,
+        triangles=triangles,
+        boundary=boundary,
+        boundary_curve=curve,
+        boundary_arclength=arclength,
+        vertex=vertex,
+        opening_angle=angle,
+        port=asked & (smooth | ~mesh.boundary_vertex),
+    )
+
+
+def _boundary(mesh: SurfaceMesh, shape: Outline, source: Int, tag: int) -> tuple[Int, Int, Float]:
+    """Boundary half-edges with their curve and the arc lengths at their ends."""
+    half = mesh.half_edges[np.sort(mesh.edge_half_edges[mesh.boundary_edge, 0])]
+    a, b = source[half].T
+    n = len(shape.points)
+    key = shape.segments.min(axis=1) * n + shape.segments.max(axis=1)
+    order = np.argsort(key)
+    wanted = np.minimum(a, b) * n + np.maximum(a, b)
+    segment = order[np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)]
+    if (np.minimum(a, b) < 0).any() or not np.array_equal(key[segment], wanted):
+        raise MeshError("a boundary edge of the background mesh is on no curve", entity=(2, tag))
+    forward = shape.segments[segment, 0] == a
+    s = shape.arclength[segment]
+    return half, shape.curve[segment], np.where(forward[:, None], s, s[:, ::-1])
+
+
+def _opening_angles(model: Model, row: int, mesh: SurfaceMesh, boundary: Int, curve: Int, arclength: Float, vertex: Int) -> Float:
+    """Angles of the boundary sectors at CAD vertices, NaN elsewhere."""
+    out = np.full(len(mesh.points), np.nan)
+    outgoing = {v: i for i, v in enumerate(boundary[:, 0].tolist()) if vertex[v] >= 0}
+    incoming = {v: i for i, v in enumerate(boundary[:, 1].tolist()) if vertex[v] >= 0}
+    direction = end_directions(model, row)
+
+    def leaving(half_edge: int, at: int) -> float:
+        """Direction in which the curve of a half-edge leaves its end `at`."""
+        c = int(curve[half_edge])
+        return direction[c, 0 if arclength[half_edge, at] < 0.5 * model.curves[c].length else 1]
+
+    for v, first in outgoing.items():
+        turn = leaving(incoming[v], 1) - leaving(first, 0)
+        # the representative nearest to the mesh, but never outside (0, 2 pi]
+        turns = round((mesh.angle_sum[v] - turn) / (2 * np.pi))
+        angle = turn + 2 * np.pi * turns
+        out[v] = angle + 2 * np.pi if angle <= 0 else angle - 2 * np.pi if angle > 2 * np.pi + 1e-9 else angle
+    return np.minimum(out, 2 * np.pi)
