@@ -1,0 +1,48 @@
+"""The options of a run from keyword arguments, checked before anything is done."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from .errors import InputError
+from .options import MeshOptions
+
+__all__ = ["check_options"]
+
+_NAMES = tuple(f.name for f in dataclasses.fields(MeshOptions))
+
+
+def check_options(**options: Any) -> MeshOptions:
+    """Options from keyword arguments, each checked.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, and for a value that is no number, not finite or out of range.
+    """
+    for name in options:
+        if name not in _NAMES:
+            raise InputError(f"unknown option {name!r}", remedy="the options are " + ", ".join(_NAMES))
+    if options.get("size") is None:
+        options.pop("size", None)
+    for name in ("size", "block_size", "background"):
+        if name in options:
+            options[name] = _positive(name, options[name])
+    if "max_quads" in options:
+        count = _positive("max_quads", options["max_quads"])
+        if count != int(count):
+            raise InputError(f"max_quads is {count:g}", remedy="give a whole number")
+        options["max_quads"] = int(count)
+    return MeshOptions(**options)
+
+
+def _positive(name: str, value: Any) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} is {value!r}", remedy="give a positive number") from None
+    if not (math.isfinite(number) and number > 0.0):
+        raise InputError(f"{name} is {number:g}", remedy="give a positive number")
+    return number

@@ -1,0 +1,349 @@
+"""Judging a surface mesh from a file, by itself and against the model that it is a mesh of.
+
+By itself: cells, scaled Jacobians against the mean normal of each surface (a cell folded over shows as negative), irregular
+vertices (valence not 4, off the free boundary and off all line elements), and conformity: an edge with a single cell must not
+have nodes of other single-cell edges in its inside (a hanging node), nor lie on another such edge (a crack).
+
+Against the model: every CAD vertex is a node, every edge with a single cell follows a curve at which the model's faces end,
+the area is the model's, and every physical group is carried in full.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .embed.quality import scaled_jacobian
+from .quality import twins
+from .records import Float, Int
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .cad.files import MeshArrays
+    from .records import Model
+
+__all__ = ["Report", "check_mesh", "check_task", "compare", "format_report"]
+
+_TOUCH = 1e-6
+"""Distance over the mesh's diagonal below which two places are the same."""
+_MEASURE = 0.02
+"""Relative difference of a length or area that a mesh may have from its model (polygons inside circles)."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """The numbers of a mesh.
+
+    Attributes
+    ----------
+    nodes, quads, triangles : int
+    min_scaled_jacobian, mean_scaled_jacobian : float
+    inverted : int
+        Cells whose scaled Jacobian is not positive.
+    irregular : int
+        Inner vertices, off all curves, whose number of quads is not 4.
+    hanging : int
+        Edges with a single cell where there should be two, as far as the mesh alone (or with the model) can tell.
+    groups : tuple of str
+        Names of the physical groups.
+    faults : tuple of str
+        What is wrong, in words; empty for a good mesh.
+    """
+
+    nodes: int
+    quads: int
+    triangles: int
+    min_scaled_jacobian: float
+    mean_scaled_jacobian: float
+    inverted: int
+    irregular: int
+    hanging: int
+    groups: tuple[str, ...]
+    faults: tuple[str, ...] = field(default=())
+
+
+def _jacobians(points: Float, cells: Int, entity: Int) -> Float:
+    """Scaled Jacobian of every cell against the mean normal of its surface where that is flat, else against its own."""
+    area = 0.5 * np.cross(points[cells[:, 2]] - points[cells[:, 0]], points[cells[:, -1]] - points[cells[:, 1]])
+    if cells.shape[1] == 3:
+        area = 0.5 * np.cross(points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, 2]] - points[cells[:, 0]])
+    _, row = np.unique(entity, return_inverse=True)
+    total = np.stack([np.bincount(row, area[:, c]) for c in range(3)], axis=1)
+    size = np.linalg.norm(area, axis=1)
+    normal = _unit(total)[row]
+    length = np.linalg.norm(total, axis=1)[row]
+    # all normals parallel (or opposite, where folded): their cross products with the mean vanish
+    turned = np.bincount(row, np.linalg.norm(np.cross(area, normal), axis=1)) > 1e-6 * np.bincount(row, size)
+    curved = turned[row] | (length == 0.0)
+    normal[curved] = _unit(area[curved])
+    if cells.shape[1] == 4:
+        return scaled_jacobian(points, cells, normal)
+    side = np.roll(points[cells], -1, axis=1) - points[cells]
+    scale = np.linalg.norm(side, axis=2)
+    product = (scale * np.roll(scale, 1, axis=1)).max(axis=1)
+    value = 2.0 * np.einsum("tc,tc->t", area, normal) * (2.0 / np.sqrt(3.0))
+    return np.divide(value, product, out=np.zeros(len(cells)), where=product > 0.0)
+
+
+def _unit(vectors: Float) -> Float:
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+
+
+def _free_edges(mesh: MeshArrays) -> Int:
+    """Edges (k, 2) with a single cell."""
+    cells = np.concatenate(
+        [mesh.quads, np.column_stack([mesh.triangles, mesh.triangles[:, 0]])]
+    )  # a triangle: one edge of no length
+    half = np.stack([cells.ravel(), np.roll(cells, -1, axis=1).ravel()], axis=1)
+    real = half[:, 0] != half[:, 1]
+    half = np.sort(half[real], axis=1)
+    n = len(mesh.points)
+    key, count = np.unique(half[:, 0] * n + half[:, 1], return_counts=True)
+    alone = key[count == 1]
+    return np.stack([alone // n, alone % n], axis=1)
+
+
+def _hanging(points: Float, edges: Int, touch: float) -> int:
+    """Free edges that another free edge's node lies on, or that coincide with another one over duplicate nodes."""
+    from scipy.spatial import cKDTree
+
+    if not len(edges):
+        return 0
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    length = np.linalg.norm(b - a, axis=1)
+    nodes = np.unique(edges)
+    near = cKDTree(points[nodes]).query_ball_point(0.5 * (a + b), 0.5 * length + touch)
+    count = np.array([len(x) for x in near])
+    edge = np.repeat(np.arange(len(edges)), count)
+    node = nodes[np.concatenate([np.asarray(x, np.int64) for x in near])] if len(edge) else np.zeros(0, np.int64)
+    other = (node != edges[edge, 0]) & (node != edges[edge, 1])
+    edge, node = edge[other], node[other]
+    direction = (b - a)[edge] / np.maximum(length[edge], touch)[:, None]
+    offset = points[node] - a[edge]
+    along = np.einsum("kc,kc->k", offset, direction)
+    aside = np.linalg.norm(offset - along[:, None] * direction, axis=1)
+    on = (aside < np.maximum(touch, 1e-3 * length[edge])) & (along > 0.01 * length[edge]) & (along < 0.99 * length[edge])
+    hanging = np.zeros(len(edges), bool)
+    hanging[edge[on]] = True
+    mid = cKDTree(0.5 * (a + b))
+    for i, j in sorted(mid.query_pairs(touch)):
+        hanging[[i, j]] = True
+    return int(hanging.sum())
+
+
+def check_mesh(mesh: MeshArrays) -> Report:
+    """Judge a mesh by itself.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+
+    Returns
+    -------
+    Report
+    """
+    quality = np.concatenate(
+        [
+            _jacobians(mesh.points, cells, entity)
+            for cells, entity in ((mesh.quads, mesh.quad_entity), (mesh.triangles, mesh.triangle_entity))
+            if len(cells)
+        ]
+        or [np.zeros(0)]
+    )
+    used = np.unique(np.concatenate([mesh.quads.ravel(), mesh.triangles.ravel()]))
+    free = _free_edges(mesh)
+    inner = np.ones(len(mesh.points), bool)
+    inner[free.ravel()] = False
+    inner[mesh.lines.ravel()] = False
+    valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
+    has_quads = valence > 0
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0))) if len(used) else 0.0
+    hanging = _hanging(mesh.points, free, _TOUCH * diagonal)
+    faults = []
+    if not len(mesh.quads):
+        faults.append("no quads")
+    if len(mesh.triangles):
+        faults.append(f"{len(mesh.triangles)} triangles")
+    inverted = int((quality <= 0.0).sum())
+    if inverted:
+        faults.append(f"{inverted} inverted cells")
+    if hanging:
+        faults.append(f"not conforming at {hanging} edges")
+    if _turned_over(mesh):
+        faults.append("neighbouring cells of one surface are oriented differently")
+    return Report(
+        nodes=len(used),
+        quads=len(mesh.quads),
+        triangles=len(mesh.triangles),
+        min_scaled_jacobian=float(quality.min(initial=np.inf)) if len(quality) else float("nan"),
+        mean_scaled_jacobian=float(quality.mean()) if len(quality) else float("nan"),
+        inverted=inverted,
+        irregular=int((inner & has_quads & (valence != 4)).sum()),
+        hanging=hanging,
+        groups=tuple(name for _, name in sorted(mesh.groups)),
+        faults=tuple(faults),
+    )
+
+
+def _turned_over(mesh: MeshArrays) -> bool:
+    """Whether two quads of one surface run their common edge the same way."""
+    twin = twins(mesh.quads)
+    paired = np.flatnonzero(twin >= 0)
+    start, entity = mesh.quads.ravel(), np.repeat(mesh.quad_entity, 4)
+    other = twin[paired]
+    return bool(((start[paired] == start[other]) & (entity[paired] == entity[other])).any())
+
+
+def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[int, str], tuple[int, ...]]) -> Report:
+    """Add what is wrong with respect to the model.
+
+    Parameters
+    ----------
+    report : Report
+    mesh : MeshArrays
+    model : Model
+    groups : dict of (dim, name) -> entity tags
+        The model's physical groups.
+
+    Returns
+    -------
+    Report
+    """
+    from scipy.spatial import cKDTree
+
+    faults = list(report.faults)
+    used = np.unique(np.concatenate([mesh.quads.ravel(), mesh.triangles.ravel()]))
+    if not len(used):
+        return report
+    points = (mesh.points - model.origin) / model.scale
+    tree = cKDTree(points[used])
+    wanted = np.flatnonzero(model.vertex_tags >= 0)
+    missed = int((tree.query(model.vertices[wanted])[0] > _TOUCH).sum())
+    if missed:
+        faults.append(f"{missed} CAD vertices are no nodes")
+    loose = _loose_edges(points, _free_edges(mesh), model)
+    if loose:
+        faults.append(f"{loose} edges with one cell are not on the boundary of the model")
+    areas = np.array([_face_area(model, row) for row in range(len(model.faces))])
+    area = _cell_areas(points, mesh)
+    if abs(area.sum() - areas.sum()) > _MEASURE * areas.sum():
+        faults.append(f"the area is {area.sum() * model.scale**2:.6g} and not {areas.sum() * model.scale**2:.6g}")
+    if mesh.groups:
+        faults += _lost_groups(mesh, model, groups, areas)
+    return Report(**{**asdict(report), "hanging": max(report.hanging, loose), "faults": tuple(faults), "groups": report.groups})
+
+
+def _cell_areas(points: Float, mesh: MeshArrays) -> Float:
+    q, t = points[mesh.quads], points[mesh.triangles]
+    quads = 0.5 * np.linalg.norm(np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1]), axis=1)
+    return np.concatenate([quads, 0.5 * np.linalg.norm(np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0]), axis=1)])
+
+
+def _face_area(model: Model, row: int) -> float:
+    """Area (scaled) inside the loops of a face."""
+    face = model.faces[row]
+    total = 0.0
+    for loop in face.loops:
+        for curve, sign in loop:
+            p = face.local(model.curves[curve].points)[::sign]
+            total += 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]))
+    return total
+
+
+def _loose_edges(points: Float, edges: Int, model: Model) -> int:
+    """Edges with a single cell whose ends are not both on one of the curves that bound one face only."""
+    uses = np.zeros(len(model.curves), np.int64)
+    for face in model.faces:
+        for loop in face.loops:
+            for curve, _ in loop:
+                uses[curve] += 1
+    a = np.concatenate([c.points[:-1] for c, u in zip(model.curves, uses, strict=True) if u == 1] or [np.zeros((0, 3))])
+    b = np.concatenate([c.points[1:] for c, u in zip(model.curves, uses, strict=True) if u == 1] or [np.zeros((0, 3))])
+    if not len(edges):
+        return 0
+    if not len(a):
+        return len(edges)
+    ends = np.unique(edges)
+    on = np.zeros(len(points), bool)
+    on[ends] = _distance(points[ends], a, b) < 1e-5
+    return int((~on[edges].all(axis=1)).sum())
+
+
+def _distance(points: Float, a: Float, b: Float) -> Float:
+    """Distance of points (n, 3) from the segments a-b, each cut into pieces short enough for a nearest-neighbour search."""
+    from scipy.spatial import cKDTree
+
+    length = np.linalg.norm(b - a, axis=1)
+    pieces = np.maximum(1, np.ceil(length / 0.01).astype(np.int64))
+    row = np.repeat(np.arange(len(a)), pieces)
+    place = (np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 0.5) / pieces[row]
+    tree = cKDTree(a[row] + place[:, None] * (b - a)[row])
+    near = row[tree.query(points, k=min(8, len(row)))[1].reshape(len(points), -1)]
+    offset, side = points[:, None] - a[near], (b - a)[near]
+    t = np.clip(np.einsum("nkc,nkc->nk", offset, side) / np.maximum(length[near] ** 2, np.finfo(float).tiny), 0.0, 1.0)
+    return np.linalg.norm(offset - t[..., None] * side, axis=2).min(axis=1)
+
+
+def _lost_groups(mesh: MeshArrays, model: Model, groups: dict[tuple[int, str], tuple[int, ...]], areas: Float) -> list[str]:
+    """Physical groups of curves and surfaces whose measure the mesh does not carry."""
+    points = (mesh.points - model.origin) / model.scale
+    cell = _cell_areas(points, mesh)
+    cell_entity = np.concatenate([mesh.quad_entity, mesh.triangle_entity])
+    line = np.linalg.norm(points[mesh.lines[:, 1]] - points[mesh.lines[:, 0]], axis=1)
+    truth = {
+        1: {c.tag: c.length for c in model.curves},
+        2: {f.tag: float(a) for f, a in zip(model.faces, areas, strict=True)},
+    }
+    found = {1: (line, mesh.line_entity), 2: (cell, cell_entity)}
+    faults = []
+    for (dim, name), entities in sorted(groups.items()):
+        if dim not in truth:
+            continue
+        expected = sum(truth[dim].get(e, 0.0) for e in entities)
+        measure, owner = found[dim]
+        actual = float(measure[np.isin(owner, mesh.groups.get((dim, name), ()))].sum())
+        if abs(actual - expected) > _MEASURE * expected:
+            faults.append(f"the physical {'curve' if dim == 1 else 'surface'} {name!r} is not carried in full")
+    return faults
+
+
+def format_report(report: Report, name: str) -> str:
+    """The report as a plain table."""
+    rows = [
+        ("nodes", f"{report.nodes}"),
+        ("quads", f"{report.quads}"),
+        ("triangles", f"{report.triangles}"),
+        ("scaled Jacobian, min", f"{report.min_scaled_jacobian:.3f}"),
+        ("scaled Jacobian, mean", f"{report.mean_scaled_jacobian:.3f}"),
+        ("inverted cells", f"{report.inverted}"),
+        ("irregular vertices", f"{report.irregular}"),
+        ("conforming", "no" if report.hanging else "yes"),
+        ("physical groups", ", ".join(report.groups) or "none"),
+    ]
+    lines = [name, *(f"  {label:<22} {value}" for label, value in rows)]
+    lines.append("ok" if not report.faults else "fails: " + "; ".join(report.faults))
+    return "\n".join(lines)
+
+
+def check_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
+    """The work of ``gmsh-crossquad check``, in the child process: the table as text, and the faults."""
+    from .cad.files import open_model, physical_groups, read_mesh
+    from .cad.session import guest
+
+    with guest():
+        emit("open the mesh")
+        open_model(job["mesh"])
+        mesh = read_mesh()
+        report = check_mesh(mesh)
+        if job["model"]:
+            from .cad.read import read_model
+            from .options import MeshOptions
+
+            emit("open the model")
+            open_model(job["model"])
+            report = compare(report, mesh, read_model(MeshOptions()), physical_groups())
+    return {"table": format_report(report, job["mesh"]), "faults": list(report.faults)}

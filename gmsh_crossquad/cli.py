@@ -1,0 +1,232 @@
+"""The command `gmsh-crossquad`: `mesh` makes a quad mesh of a model, `check` judges one.
+
+This process parses the arguments and checks the paths; the work is done in a child process (see `child`).  A file appears
+under its name only when all of it is written; whatever was there before stays if anything fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import signal
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from . import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from .progress import Display
+
+__all__ = ["main", "mesh_task"]
+
+PROGRAM = "gmsh-crossquad"
+
+
+class _Parser(argparse.ArgumentParser):
+    """Reports a usage error on one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{PROGRAM}: error: {' '.join(message.split())} (see {self.prog} --help)\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog=PROGRAM, description="Block-structured pure-quad meshes of Gmsh models from cross fields.")
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True, parser_class=_Parser)
+
+    mesh = commands.add_parser(
+        "mesh", help="mesh the surfaces of a model", description="Mesh the surfaces of a model with quads."
+    )
+    mesh.add_argument("model", help="model that Gmsh opens: .geo, .step, .brep, .msh with geometry, ...")
+    mesh.add_argument("-o", "--output", required=True, help="mesh file; the format goes by the extension (.msh, .vtu, .inp, ...)")
+    mesh.add_argument("--size", type=float, metavar="H", help="target edge length (default: the sizes of the model)")
+    mesh.add_argument("--max-quads", type=int, metavar="N", help="refuse to make more quads than this (default: 10000000)")
+    mesh.add_argument("--block-size", type=float, metavar="F", help="wanted block edge over the size (default: 4)")
+    mesh.add_argument("--picture", metavar="PNG", help="draw cross field, block layout and mesh")
+    mesh.add_argument("--vtu", metavar="VTU", help="write mesh, layout and field for ParaView")
+
+    check = commands.add_parser(
+        "check", help="judge a mesh", description="Print the quality of a mesh; exit status 1 if it is bad."
+    )
+    check.add_argument("mesh", help="mesh file that Gmsh reads")
+    check.add_argument("--model", help="the model that it is a mesh of: compare boundary, area and groups too")
+
+    for command in (mesh, check):
+        loudness = command.add_mutually_exclusive_group()
+        loudness.add_argument("--quiet", action="store_true", help="print nothing but errors")
+        loudness.add_argument("--verbose", action="store_true", help="print every stage, and tracebacks")
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    argv : list of str, optional
+        Arguments; default those of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 no mesh (or a bad one), 2 wrong usage, 3 a model that cannot be meshed, 130 interrupted.
+    """
+    try:
+        arguments = _parser().parse_args(argv)
+    except SystemExit as end:
+        return int(end.code or 0)
+    from .errors import CrossQuadError
+
+    verbose = bool(arguments.verbose)
+    try:
+        signal.signal(signal.SIGTERM, _terminate)
+        status = _mesh(arguments) if arguments.command == "mesh" else _check(arguments)
+        sys.stdout.flush()
+        return status
+    except CrossQuadError as error:
+        details = getattr(error, "details", "")
+        if verbose and details:
+            print(details, end="", file=sys.stderr)
+        return _fail(str(error), error.exit_status)
+    except KeyboardInterrupt:
+        return _fail("interrupted", 130)
+    except BrokenPipeError:  # the reader of our output has gone, as in `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except Exception as error:
+        if verbose:
+            import traceback
+
+            traceback.print_exc()
+        return _fail(f"internal error: {type(error).__name__}: {error}: run again with --verbose and report it", 1)
+
+
+def _terminate(_signal: int, _frame: object) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _fail(message: str, status: int) -> int:
+    with suppress(OSError):
+        print(f"{PROGRAM}: error: {' '.join(message.split())}", file=sys.stderr, flush=True)
+    return status
+
+
+def _display(arguments: argparse.Namespace) -> Display:
+    from .progress import Display
+
+    return Display(quiet=arguments.quiet, verbose=arguments.verbose)
+
+
+def _mesh(arguments: argparse.Namespace) -> int:
+    from .arguments import check_options
+    from .child import run
+    from .errors import InputError
+    from .formats import MESH_FORMATS, PICTURE_FORMATS, check_input, check_output, check_suffix, temporary_beside
+
+    values = {name: getattr(arguments, name) for name in ("size", "max_quads", "block_size")}
+    values = {name: value for name, value in values.items() if value is not None}
+    check_options(**values)
+    check_input(arguments.model)
+    check_suffix(arguments.output, MESH_FORMATS, "mesh")
+    wanted = {"output": arguments.output}
+    if arguments.picture:
+        check_suffix(arguments.picture, PICTURE_FORMATS, "picture")
+        wanted["picture"] = arguments.picture
+    if arguments.vtu:
+        check_suffix(arguments.vtu, (".vtu",), "ParaView")
+        wanted["vtu"] = arguments.vtu
+    places = {kind: check_output(path) for kind, path in wanted.items()}
+    if Path(os.path.realpath(arguments.model)) in places.values():
+        raise InputError(f"the output {arguments.output!r} is the model itself", remedy="choose another name")
+    if len(set(places.values())) < len(places):
+        raise InputError("two outputs have the same name", remedy="choose another name for one")
+    unfinished = {kind: temporary_beside(place) for kind, place in places.items()}
+    job = {"model": arguments.model, "options": values, "verbose": arguments.verbose}
+    job |= {kind: str(path) for kind, path in unfinished.items()}
+    try:
+        answer = run("cli:mesh_task", job, _display(arguments))
+        for kind, place in places.items():
+            if place.exists():
+                shutil.copymode(place, unfinished[kind])
+            os.replace(unfinished[kind], place)
+    finally:
+        for path in unfinished.values():
+            path.unlink(missing_ok=True)
+    if not arguments.quiet:
+        _print_outcome(arguments, answer)
+    return 0
+
+
+def _print_outcome(arguments: argparse.Namespace, answer: dict[str, Any]) -> None:
+    from .progress import print_timings
+
+    print_timings(answer["timings"])
+    for note in answer["notes"]:
+        print(f"note: {note}")
+    q = answer["quality"]
+    blocks = "1 block" if q["blocks"] == 1 else f"{q['blocks']} blocks"
+    print(
+        f"{arguments.output}: {q['quads']} quads in {blocks}, scaled Jacobian min {q['min_scaled_jacobian']:.3f} "
+        f"mean {q['mean_scaled_jacobian']:.3f}, {q['irregular']} irregular vertices"
+    )
+
+
+def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
+    """The work of ``gmsh-crossquad mesh``, in the child process."""
+    import time
+    from contextlib import contextmanager
+    from dataclasses import asdict
+
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(name: str) -> Iterator[None]:
+        emit(name)
+        start = time.perf_counter()
+        yield
+        seconds[name] = time.perf_counter() - start
+
+    with stage("start"):
+        from .cad.files import open_model, write_mesh
+        from .cad.session import guest
+    with guest():
+        with stage("open"):  # first of all: most mistakes show here
+            open_model(job["model"])
+        with stage("load"):
+            from .api import mesh
+        result = mesh(progress=emit, **job["options"])
+        seconds |= result.timings
+        with stage("write"):
+            write_mesh(job["output"])
+        with stage("measure"):
+            quality = asdict(result.quality)
+        if "vtu" in job:
+            with stage("vtu"):
+                result.write_vtu(job["vtu"])
+        if "picture" in job:
+            with stage("picture"):
+                result.picture(job["picture"])
+    return {"quality": quality, "notes": list(result.notes), "timings": seconds}
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from .child import run
+    from .formats import check_input
+
+    check_input(arguments.mesh)
+    if arguments.model:
+        check_input(arguments.model)
+    job = {"mesh": arguments.mesh, "model": arguments.model, "verbose": arguments.verbose}
+    answer = run("check:check_task", job, _display(arguments))
+    if not arguments.quiet:
+        print(answer["table"])
+    return 1 if answer["faults"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,131 @@
+"""The numbers of a quad mesh: scaled Jacobians, irregular vertices, conformity.
+
+All of them come from the connectivity (integers) and from `scaled_jacobian`; nothing is measured with a tolerance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .embed.quality import scaled_jacobian
+from .records import Bool, Float, Int, QuadMesh
+
+__all__ = ["Quality", "curve_edges", "is_conforming", "measure_quality", "twins"]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Numbers of a quad mesh.
+
+    Attributes
+    ----------
+    nodes, quads, blocks : int
+    irregular : int
+        Nodes off all CAD curves whose valence is not 4.
+    min_scaled_jacobian, p5_scaled_jacobian, mean_scaled_jacobian : float
+        Least, 5 % quantile and mean over the quads; 1 is a rectangle.
+    inverted : int
+        Quads whose scaled Jacobian is not positive.
+    conforming : bool
+        Every edge has its two quads of one face, or lies on a CAD curve.
+    """
+
+    nodes: int
+    quads: int
+    blocks: int
+    irregular: int
+    min_scaled_jacobian: float
+    p5_scaled_jacobian: float
+    mean_scaled_jacobian: float
+    inverted: int
+    conforming: bool
+
+
+def twins(quads: Int) -> Int:
+    """Opposite half-edge (4 q,) of half-edge ``4 q + i`` (corner i to i + 1): -1 where alone, -2 where more than two meet."""
+    start = quads.ravel()
+    end = np.roll(quads, -1, axis=1).ravel()
+    key = np.minimum(start, end) * (int(quads.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])) if len(key) else np.zeros(0, np.int64)
+    count = np.diff(np.append(first, len(key)))
+    twin = np.full(len(key), -1, np.int64)
+    two = first[count == 2]
+    twin[order[two]] = order[two + 1]
+    twin[order[two + 1]] = order[two]
+    twin[order[np.repeat(count > 2, count)]] = -2
+    return twin
+
+
+def curve_edges(mesh: QuadMesh) -> Int:
+    """Row of `curve_nodes` that half-edge ``4 q + i`` (4 q,) of the mesh lies on, -1 elsewhere."""
+    n = len(mesh.points)
+    start = mesh.quads.ravel()
+    end = np.roll(mesh.quads, -1, axis=1).ravel()
+    out = np.full(len(start), -1, np.int64)
+    chains = mesh.curve_nodes
+    if not chains or not len(start):
+        return out
+    a = np.concatenate([c[:-1] for c in chains])
+    b = np.concatenate([c[1:] for c in chains])
+    row = np.repeat(np.arange(len(chains)), [max(len(c) - 1, 0) for c in chains])
+    key = np.minimum(a, b) * n + np.maximum(a, b)
+    order = np.argsort(key, kind="stable")
+    key, row = key[order], row[order]
+    if not len(key):
+        return out
+    on_curve = np.zeros(n, bool)
+    on_curve[a] = on_curve[b] = True
+    candidates = np.flatnonzero(on_curve[start] & on_curve[end])
+    wanted = np.minimum(start, end)[candidates] * n + np.maximum(start, end)[candidates]
+    place = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+    hit = key[place] == wanted
+    out[candidates[hit]] = row[place[hit]]
+    return out
+
+
+def is_conforming(mesh: QuadMesh, twin: Int, on_curve: Bool) -> bool:
+    """Whether every edge off the CAD curves has exactly two quads, of one face and oriented alike."""
+    inner = np.flatnonzero(~on_curve)
+    other = twin[inner]
+    if (other < 0).any():
+        return False
+    start = mesh.quads.ravel()
+    return bool((mesh.quad_face[inner // 4] == mesh.quad_face[other // 4]).all() and (start[inner] != start[other]).all())
+
+
+def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
+    """Measure a quad mesh.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+    normals : (f, 3) float64
+        Unit normal of every face.
+
+    Returns
+    -------
+    Quality
+    """
+    value = scaled_jacobian(mesh.points, mesh.quads, normals[mesh.quad_face])
+    twin = twins(mesh.quads)
+    on_curve = curve_edges(mesh) >= 0
+    inner = np.ones(len(mesh.points), bool)
+    for chain in mesh.curve_nodes:
+        inner[chain] = False
+    inner[mesh.vertex_node[mesh.vertex_node >= 0]] = False
+    valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
+    return Quality(
+        nodes=len(mesh.points),
+        quads=len(mesh.quads),
+        blocks=len(np.unique(mesh.quad_block)),
+        irregular=int((inner & (valence != 4) & (valence > 0)).sum()),
+        min_scaled_jacobian=float(value.min(initial=np.inf)),
+        p5_scaled_jacobian=float(np.quantile(value, 0.05)),
+        mean_scaled_jacobian=float(value.mean()),
+        inverted=int((value <= 0.0).sum()),
+        conforming=is_conforming(mesh, twin, on_curve),
+    )
