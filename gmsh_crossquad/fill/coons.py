@@ -49,7 +49,7 @@ def coons(bottom: Float, right: Float, top: Float, left: Float) -> Float:
 
 def _relative_length(a: Float, b: Float) -> Float:
     """(m, k + 1) relative arc length of two opposite sides (d, m, k + 1), averaged."""
-    out = np.zeros(a.shape[1:])
+    out = np.zeros((a.shape[1], a.shape[2]))
     step = np.sqrt((np.diff(a) ** 2).sum(axis=0)) + np.sqrt((np.diff(b) ** 2).sum(axis=0))
     np.cumsum(step, axis=1, out=out[:, 1:])
     total = out[:, -1:].copy()

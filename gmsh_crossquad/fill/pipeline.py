@@ -19,7 +19,7 @@ from .numbering import guide_chords, guide_topology, number
 from .skeleton import Frames, Skeleton
 from .tangents import continuation, end_tangents
 
-__all__ = ["fill"]
+__all__ = ["fill", "poor_cells"]
 
 ROUNDS = 6  # of straightening; each halves the bulge
 KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
@@ -62,18 +62,55 @@ def fill(
     """
     if filler not in ("numpy", "gmsh"):
         raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
+    cells, points, parameters = _prepare(model, guide, divisions, evaluate, vertices)
+    own = cells.corner_quality()
+    _refuse_folds(model, guide, own, _place(cells, own, points))
+    if filler == "gmsh":
+        from .gmsh_fill import gmsh_cells
+
+        for q, inside in enumerate(gmsh_cells(guide.quads, cells.topology, cells.skeleton)):
+            first = cells.numbering.cell_first[q]
+            points[first : first + len(inside)] = inside * model.scale + model.origin
+    return _record(guide, cells, points, parameters, int(np.count_nonzero(own <= 0)))
+
+
+def poor_cells(
+    model: Model, guide: Guide, divisions: Int, evaluate: Callable[[int, Float], Float], vertices: Float | None = None
+) -> Int:
+    """Guide quads that come out of `fill` worse than they should: divide their chords and smooth the guide again.
+
+    Parameters
+    ----------
+    model, guide, divisions, evaluate, vertices
+        As for `fill`; 8 divisions show what any greater number would.
+
+    Returns
+    -------
+    (k,) int64
+        Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
+        inner edges were straightened.
+    """
+    cells, points, _ = _prepare(model, guide, divisions, evaluate, vertices)
+    own = cells.corner_quality()
+    out: Int = np.flatnonzero(_place(cells, own, points) < KEEP * np.maximum(own, POOR))
+    return out
+
+
+def _prepare(
+    model: Model, guide: Guide, divisions: Int, evaluate: Callable[[int, Float], Float], vertices: Float | None
+) -> tuple[Cells, Float, tuple[Float, ...]]:
+    """Number the nodes and place those on curves; cells, points and the parameters of every curve's nodes."""
     edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
     if len(divisions) != n_chords:
         raise MeshError(f"{len(divisions)} divisions for {n_chords} guide chords", remedy="report this model")
     topology = guide_topology(guide, edges, quad_edges)
-    numbering = number(guide, topology, np.asarray(divisions, np.int64)[chord], len(model.vertices), len(model.faces))
-    pieces = numbering.divisions
-    frames, skeleton = Frames.of(model), Skeleton.start(guide, pieces)
+    pieces = np.asarray(divisions, np.int64)[chord]
+    numbering = number(guide, topology, pieces, len(model.vertices), len(model.faces))
+    skeleton = Skeleton.start(guide, pieces)
     points = np.empty((numbering.n_nodes, 3))
     used = numbering.vertex_node >= 0
     exact = model.vertices * model.scale + model.origin if vertices is None else vertices
     points[numbering.vertex_node[used]] = exact[used]
-
     parameters = []
     for row, (chain, e, forward) in enumerate(zip(guide.chains, topology.chain_edges, topology.chain_forward)):
         curve, nodes = model.curves[row], numbering.curve_nodes[row]
@@ -84,29 +121,18 @@ def fill(
             points[nodes[1:-1]] = evaluate(row, t[1:-1])
         parameters.append(t)
         skeleton.put_chain(chain, e, forward, (points[nodes] - model.origin) / model.scale)
-
-    tangents = end_tangents(skeleton.vertices, edges, pieces, continuation(guide.quads, topology))
-    skeleton.put_cubics(np.flatnonzero(~topology.on_curve), edges, tangents)
-    cells = Cells(guide, topology, numbering, skeleton, frames)
-    own = cells.corner_quality()
-    worst = _place(cells, own, tangents, points)
-    _refuse_folds(model, guide, own, worst)
-    skeleton.write(points, guide, numbering, topology, frames)
-    if filler == "gmsh":
-        from .gmsh_fill import gmsh_cells
-
-        for q, inside in enumerate(gmsh_cells(guide.quads, topology, skeleton)):
-            first = numbering.cell_first[q]
-            points[first : first + len(inside)] = inside * model.scale + model.origin
-    return _record(guide, cells, points, tuple(parameters), int(np.count_nonzero(own <= 0)))
+    return Cells(guide, topology, numbering, skeleton, Frames.of(model)), points, tuple(parameters)
 
 
-def _place(cells: Cells, own: Float, tangents: Float, points: Float) -> Float:
-    """Fill all cells, straightening edges beside bad ones; the least scaled Jacobian (q,) of every cell."""
+def _place(cells: Cells, own: Float, points: Float) -> Float:
+    """Place all that is inside faces, straightening edges beside bad cells; the least scaled Jacobian (q,) of every cell."""
     topology, skeleton = cells.topology, cells.skeleton
     edges, quad_edges = topology.edges, topology.quad_edges
-    free = ~topology.on_curve & (skeleton.divisions > 1)
+    inner = np.flatnonzero(~topology.on_curve)
+    tangents = end_tangents(skeleton.vertices, edges, skeleton.divisions, continuation(cells.guide.quads, topology))
+    skeleton.put_cubics(inner, edges, tangents)
     worst = cells.place(np.arange(len(quad_edges)), points)
+    free = ~topology.on_curve & (skeleton.divisions > 1)
     for _ in range(ROUNDS):
         soft: Bool = np.zeros(len(edges), bool)
         soft[quad_edges[worst < KEEP * np.maximum(own, POOR)]] = True
@@ -118,6 +144,7 @@ def _place(cells: Cells, own: Float, tangents: Float, points: Float) -> Float:
         skeleton.put_cubics(e, edges, tangents)
         again = np.flatnonzero(np.any((soft & free)[quad_edges], axis=1))
         worst[again] = cells.place(again, points)
+    skeleton.write(points, cells.guide, cells.numbering, topology, cells.frames)
     return worst
 
 
