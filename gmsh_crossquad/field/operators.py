@@ -88,7 +88,8 @@ class FieldOperators:
     def divergence(self, r: Float) -> Float:
         """(e,) adjoint of `difference` with the weights: ``sum_corners w r difference(x) = x @ divergence(r)``."""
         flow = self.weight * r
-        return np.bincount(self.mesh.triangle_edges.ravel(), (np.roll(flow, 1, axis=1) - flow).ravel(), len(self.mesh.edges))
+        pull = (np.roll(flow, 1, axis=1) - flow).ravel()
+        return np.bincount(self.mesh.triangle_edges.ravel(), pull, len(self.mesh.edges)).astype(np.float64)
 
     def solve(self, boundary_values: Float, correction: Float | None = None) -> Float:
         """Minimise ``1/2 sum w (difference(x) + correction)^2`` with `x` given on the boundary.

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..records import AlignedField, CrossField, FaceMesh, Int
-from .align import align
+from .align import Aligner, align
 from .boundary import correct_boundary
+from .clearance import Clearance
 from .corners import boundary_indices
 from .operators import FieldOperators
+from .relax import cancel_pairs, leave_corners, relax_singularities
 from .singularities import snap_to_vertices
 from .smooth import smooth_field
 from .surface_mesh import SurfaceMesh
@@ -22,7 +26,7 @@ def aligned_field(mesh: FaceMesh, field: CrossField | None = None, boundary_inde
     mesh : FaceMesh
     field : CrossField, optional
         Any cross field; its singularities are kept, so they must satisfy Poincaré–Hopf with the boundary indices.  By default the
-        smooth field, whose singularities are adapted to the boundary indices.
+        smooth field, whose singularities are adapted to the boundary indices and to the room there is for blocks.
     boundary_index : (n,) int64, optional
         Wanted indices of the boundary vertices in quarter turns; by default from the opening angles of the CAD vertices.
 
@@ -37,8 +41,16 @@ def aligned_field(mesh: FaceMesh, field: CrossField | None = None, boundary_inde
     surface = SurfaceMesh(mesh.points, mesh.triangles)
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
-    if field is None:
-        field = smooth_field(surface, operators)
-        field = CrossField(field.theta, correct_boundary(surface, field.rotation, wanted))
-    field = CrossField(field.theta, snap_to_vertices(surface, field.rotation, mesh.port))
-    return align(surface, operators, field, wanted)
+    if field is not None:
+        return align(surface, operators, CrossField(field.theta, snap_to_vertices(surface, field.rotation, mesh.port)), wanted)
+
+    aligner = Aligner(surface, operators, wanted)
+    smooth = smooth_field(surface, operators)
+    rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
+    current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation))[0])
+    clearance = Clearance(surface, [aligner.loops[i].vertices for i in aligner.holes])
+    corners = np.flatnonzero(surface.boundary_vertex & np.isfinite(mesh.opening_angle))
+    rotation, held = leave_corners(surface, clearance, current.rotation, wanted, corners, mesh.port)
+    current = aligner.rotate(CrossField(current.theta, rotation))[0]
+    current = relax_singularities(aligner, clearance, current, held, mesh.port)
+    return aligner.finish(*aligner.rotate(current))

@@ -28,10 +28,12 @@ __all__ = [
     "corner_rotation",
     "move_index",
     "shortest_path",
+    "singular_vertices",
     "snap_to_vertices",
     "to_integer",
     "triangle_index",
     "vertex_index",
+    "walk",
 ]
 
 QUARTER = 0.5 * np.pi
@@ -53,7 +55,7 @@ def triangle_index(rotation: Float) -> Int:
 
 def corner_rotation(mesh: SurfaceMesh, rotation: Float) -> Float:
     """(n,) counter-clockwise rotation of the cross through all corners of every vertex, from its last edge to its first."""
-    return np.bincount(mesh.triangles.ravel(), np.roll(rotation, 1, axis=1).ravel(), len(mesh.points))
+    return np.bincount(mesh.triangles.ravel(), np.roll(rotation, 1, axis=1).ravel(), len(mesh.points)).astype(np.float64)
 
 
 def vertex_index(mesh: SurfaceMesh, rotation: Float) -> Float:
@@ -111,6 +113,32 @@ def shortest_path(mesh: SurfaceMesh, source: Sequence[int], target: Bool, allowe
                 parent[w] = v
                 queue.append((w, depth + 1))
     return []
+
+
+def walk(mesh: SurfaceMesh, start: int, goal: Float, barred: Bool) -> list[int]:
+    """Edge path from vertex `start` towards the point `goal`, always to the nearest neighbour that is not `barred`.
+
+    Ends where no neighbour is nearer.
+    """
+    path = [start]
+    nearest = float(np.sum((mesh.points[start] - goal) ** 2))
+    while True:
+        around = [w for w in mesh.neighbours(path[-1]) if not barred[w]]
+        if not around:
+            return path
+        distance = np.sum((mesh.points[around] - goal) ** 2, axis=1)
+        best = int(np.argmin(distance))
+        if distance[best] >= nearest:
+            return path
+        nearest = float(distance[best])
+        path.append(around[best])
+
+
+def singular_vertices(mesh: SurfaceMesh, rotation: Float) -> tuple[Int, Int]:
+    """Interior vertices with an index, and their indices in quarter turns."""
+    inside = np.flatnonzero(~mesh.boundary_vertex)
+    index = to_integer(vertex_index(mesh, rotation)[inside], "the index of an interior vertex")
+    return inside[index != 0], index[index != 0]
 
 
 def snap_to_vertices(mesh: SurfaceMesh, rotation: Float, avoid: Bool | None = None) -> Float:

@@ -142,7 +142,7 @@ class SurfaceMesh:
     @cached_property
     def angle_sum(self) -> Float:
         """(n,) sum of the triangle angles at every vertex."""
-        return np.bincount(self.triangles.ravel(), self.corner_angle.ravel(), len(self.points))
+        return np.bincount(self.triangles.ravel(), self.corner_angle.ravel(), len(self.points)).astype(np.float64)
 
     @cached_property
     def curvature(self) -> Float:

@@ -1,0 +1,95 @@
+"""How far a point of a plane face is from the boundary, and how far a singularity should be.
+
+A singularity close to the boundary makes a strip of thin blocks along it.  It should keep the distance ``min(0.4 rho, 0.6 R)``: rho is the
+radius of the largest disc inside the face that (widened by half) still reaches the point, R the perimeter over 2 pi of the hole beside
+it, so that a small hole gets a ring of its own size.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..records import Float, Int
+from .surface_mesh import SurfaceMesh
+
+__all__ = ["Clearance"]
+
+
+class Clearance:
+    """Distances to the boundary of a plane mesh.
+
+    Parameters
+    ----------
+    mesh : SurfaceMesh
+        With (n, 2) points.
+    holes : list of (k,) int64
+        The boundary loops that are holes, as vertices in order.
+    """
+
+    def __init__(self, mesh: SurfaceMesh, holes: list[Int]) -> None:
+        self.mesh = mesh
+        self.holes = holes
+
+    @cached_property
+    def _samples(self) -> Float:
+        """(4 b, 2) points of every boundary edge at 0, 1/4, 1/2 and 3/4."""
+        mesh = self.mesh
+        a, b = mesh.points[mesh.edges[mesh.boundary_edge]].transpose(1, 0, 2)
+        return np.concatenate([a, 0.75 * a + 0.25 * b, 0.5 * (a + b), 0.25 * a + 0.75 * b, b])
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._samples)
+
+    @cached_property
+    def _size(self) -> Float:
+        """(4 b,) radius of the hole that a boundary sample is on, infinite on outer loops."""
+        mesh = self.mesh
+        radius = np.full(len(mesh.points), np.inf)
+        for hole in self.holes:
+            p = mesh.points[hole]
+            step = np.roll(p, -1, axis=0) - p
+            radius[hole] = np.hypot(step[:, 0], step[:, 1]).sum() / (2 * np.pi)
+        return np.tile(radius[mesh.edges[mesh.boundary_edge, 0]], 5)
+
+    @cached_property
+    def _depth(self) -> tuple[Float, Float]:
+        """Interior vertices (k, 2) and their distances (k,) from the boundary."""
+        inside = self.mesh.points[~self.mesh.boundary_vertex]
+        return inside, self._tree.query(inside)[0]
+
+    def distance(self, points: Float) -> tuple[Float, Float]:
+        """(k,) distances from the boundary and (k, 2) unit vectors away from it."""
+        d, i = self._tree.query(points)
+        away = points - self._samples[i]
+        return d, away / np.maximum(d, np.finfo(float).tiny)[:, None]
+
+    def wanted(self, points: Float) -> Float:
+        """(k,) distances that singularities at these points should keep from the boundary."""
+        inside, depth = self._depth
+        far = np.hypot(*(points[:, None] - inside[None]).transpose(2, 0, 1)) > 1.5 * depth
+        rho = np.where(far, 0.0, depth).max(axis=1)
+        return np.minimum(0.4 * rho, 0.6 * self._size[self._tree.query(points)[1]])
+
+    def free_length(self, origin: Float, direction: Float, spread: float, start: float) -> float:
+        """Length from a boundary vertex over which a sector is free of other boundary.
+
+        Parameters
+        ----------
+        origin, direction : (2,) float64
+            The vertex and the unit vector of the sector's bisector.
+        spread : float
+            Sine of half the opening angle, 1 from 180 degrees on.
+        start : float
+            A length that is free, e.g. that of an edge.
+        """
+        extent = float(np.ptp(self.mesh.points, axis=0).max())
+        ratio = 1.0 + 0.4 * spread
+        count = int(np.log(max(2.0 * extent / start, 2.0)) / np.log(ratio)) + 1
+        t = start * ratio ** np.arange(count)
+        d = self._tree.query(origin + t[:, None] * direction)[0]
+        bad = np.flatnonzero(d < 0.8 * spread * t)
+        return float(t[max(int(bad[0]) - 1, 0)] if len(bad) else t[-1])

@@ -1,0 +1,58 @@
+"""The force that the smooth part of a cross field exerts on its singularities.
+
+The harmonic field of singularities at a_i has, up to a constant per core, the energy ``E(a) = 1/2 int |grad theta|^2``.  Its negative
+gradient is the configurational force (Eshelby 1951), a contour integral of ``W n - grad theta (grad theta . n)`` around a_i with
+``W = |grad theta|^2 / 2``, taken here as the area integral
+
+    f_i = int (grad theta (grad theta . grad eta) - W grad eta) dA,    eta = 1 near a_i and 0 beyond its clearance,
+
+which never looks at the core and is one sum over the triangles.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..records import Float
+from .surface_mesh import SurfaceMesh
+
+__all__ = ["forces", "gradient"]
+
+
+def gradient(mesh: SurfaceMesh, rotation: Float) -> Float:
+    """(m, 2) gradient of the cross angle in every triangle of a plane mesh; triangle indices must be 0."""
+    p = mesh.points[mesh.triangles]
+    d = np.roll(p, -1, axis=1) - p
+    inward = np.stack([-d[..., 1], d[..., 0]], axis=2)
+    value = np.concatenate([np.zeros((len(p), 1)), np.cumsum(rotation[:, :2], axis=1)], axis=1)
+    # the basis function of edge k is 1 - 2 * (barycentric coordinate of the opposite vertex)
+    return -np.einsum("tk,tkc->tc", value, inward) / mesh.area[:, None]
+
+
+def forces(mesh: SurfaceMesh, rotation: Float, positions: Float, reach: Float) -> Float:
+    """Forces on singularities.
+
+    Parameters
+    ----------
+    rotation : (m, 3) float64
+        Of a harmonic field.
+    positions : (k, 2) float64
+    reach : (k,) float64
+        No other singularity and no boundary may be within this distance.
+
+    Returns
+    -------
+    (k, 2) float64
+        Minus the derivative of the Dirichlet energy by the position.
+    """
+    g = gradient(mesh, rotation)
+    away = np.hypot(*(mesh.points[None] - positions[:, None]).transpose(2, 0, 1))
+    hat = np.clip((reach[:, None] - away) / (0.7 * reach[:, None]), 0.0, 1.0)
+    p = mesh.points[mesh.triangles]
+    d = np.roll(p, -1, axis=1) - p
+    # gradient of the barycentric coordinate of vertex k + 2, opposite of edge k
+    slope = np.stack([-d[..., 1], d[..., 0]], axis=2) / (2 * mesh.area)[:, None, None]
+    eta = np.einsum("itk,tkc->itc", hat[:, np.roll(mesh.triangles, -2, axis=1)], slope)
+    along = np.einsum("tc,itc->it", g, eta)
+    density = 0.5 * np.sum(g * g, axis=1)
+    return np.einsum("t,it,tc->ic", mesh.area, along, g) - np.einsum("t,t,itc->ic", mesh.area, density, eta)

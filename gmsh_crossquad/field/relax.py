@@ -1,0 +1,195 @@
+"""Move singularities to where the aligned field is smooth and blocks are not thin.
+
+The smooth field has thick cores and places singularities well, except that it puts them close to holes and corners.  Those that
+are too close to the boundary move: every round solves once, moves each of them along its force (see `forces`) by at most half its clearance, and then away from the
+boundary to the distance it should keep (see `clearance`).  Positions are continuous; the index sits at the vertex nearest to them and is
+moved by whole quarter turns along edges, so that no round can change what the indices add up to.
+
+A singularity that a corner would absorb, because its field alone prefers another number of quads there, is not left to the force: it
+goes onto the corner's bisector, at 0.6 of the length over which the sector is free, and stays there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..records import Bool, CrossField, Float, Int
+from .align import Aligner
+from .clearance import Clearance
+from .forces import forces
+from .singularities import QUARTER, move_index, singular_vertices, walk
+from .surface_mesh import SurfaceMesh
+
+__all__ = ["cancel_pairs", "leave_corners", "relax_singularities"]
+
+#: energy that a quarter-turn singularity gains per factor e of core size
+_UNIT = np.pi / 16
+_ROUNDS = 10
+
+
+def _go(mesh: SurfaceMesh, rotation: Float, vertex: int, goal: Float, amount: int, barred: Bool) -> int:
+    """Move the index `amount` of `vertex` along edges towards `goal`, in place; where it is then."""
+    path = walk(mesh, vertex, goal, barred)
+    move_index(mesh, rotation, path, amount)
+    return path[-1]
+
+
+def cancel_pairs(aligner: Aligner, field: CrossField, reach: float = 4.0) -> CrossField:
+    """Merge pairs of opposite singularities closer than `reach` edges where that lowers the energy.
+
+    Parameters
+    ----------
+    aligner : Aligner
+    field : CrossField
+        Aligned and harmonic.
+
+    Returns
+    -------
+    CrossField
+        Aligned and harmonic.
+    """
+    mesh, operators = aligner.mesh, aligner.operators
+    local = np.sqrt(2.0 * mesh.area.mean())
+    barred = mesh.boundary_vertex
+    kept: set[tuple[int, int]] = set()
+    for _ in range(100):
+        vertices, index = singular_vertices(mesh, field.rotation)
+        p = mesh.points[vertices]
+        far = np.hypot(*(p[:, None] - p[None]).transpose(2, 0, 1))
+        pairs = [
+            (float(far[i, j]), i, j)
+            for i, j in zip(*np.nonzero((index[:, None] > 0) & (index[None] < 0) & (far < reach * local)))
+            if (int(vertices[i]), int(vertices[j])) not in kept
+        ]
+        if not pairs:
+            return field
+        _, i, j = min(pairs)
+        kept.add((int(vertices[i]), int(vertices[j])))
+        rotation = field.rotation.copy()
+        end = _go(mesh, rotation, int(vertices[i]), p[j], min(int(index[i]), -int(index[j])), barred)
+        if end != vertices[j]:
+            continue
+        merged = aligner.rotate(replace(field, rotation=rotation))[0]
+        if operators.energy(merged.rotation) < operators.energy(field.rotation):
+            field = merged
+    return field
+
+
+def leave_corners(
+    mesh: SurfaceMesh, clearance: Clearance, rotation: Float, wanted: Int, corners: Int, avoid: Bool
+) -> tuple[Float, list[int]]:
+    """Put singularities that lie near a corner which would absorb them onto its bisector.
+
+    Parameters
+    ----------
+    rotation : (m, 3) float64
+        With singularities at vertices only.
+    wanted : (n,) int64
+        Boundary indices.
+    corners : (k,) int64
+        Boundary vertices to look at.
+    avoid : (n,) bool
+        Vertices that no singularity may be put on.
+
+    Returns
+    -------
+    (m, 3) float64, list of int
+        The new rotation, and the vertices of singularities that the force would pull back into their corner.
+    """
+    out = rotation.copy()
+    held: list[int] = []
+    vertices, index = singular_vertices(mesh, rotation)
+    for v in corners.tolist():
+        angle = float(mesh.angle_sum[v])
+        pull = {sign: attraction(angle, 2 - int(wanted[v]), sign) for sign in (1, -1)}
+        signs = [sign for sign in (1, -1) if pull[sign] > -0.25 * _UNIT and np.any(index * sign > 0)]
+        if not signs:
+            continue
+        origin = mesh.points[v]
+        start = mesh.points[mesh.neighbours(v)[0]] - origin
+        bisector = np.arctan2(start[1], start[0]) + 0.5 * angle
+        direction = np.array([np.cos(bisector), np.sin(bisector)])
+        free = clearance.free_length(origin, direction, float(np.sin(0.5 * min(angle, np.pi))), float(np.hypot(*start)))
+        distance = np.hypot(*(mesh.points[vertices] - origin).T)
+        for sign in signs:
+            near = np.flatnonzero((index * sign > 0) & (distance < 0.4 * free) & ~np.isin(vertices, held))
+            if not len(near):
+                continue
+            k = int(near[np.argmin(distance[near])])
+            barred = mesh.boundary_vertex | avoid
+            barred[np.delete(vertices, k)] = True
+            vertices[k] = _go(mesh, out, int(vertices[k]), origin + 0.6 * free * direction, int(index[k]), barred)
+            if pull[sign] > _UNIT:
+                held.append(int(vertices[k]))
+    return out, held
+
+
+def attraction(angle: float, quads: int, sign: int) -> float:
+    """Energy per factor e of distance that a corner with `quads` quads loses by absorbing a singularity of this sign.
+
+    A sector of opening angle b with n quads turns the field by ``n pi/2 - b``, which costs ``(n pi/2 - b)^2 / (2 b)`` per factor e.
+    """
+    before, after = quads * QUARTER - angle, (quads - sign) * QUARTER - angle
+    return (before**2 - after**2) / (2.0 * angle)
+
+
+def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossField, held: list[int], avoid: Bool) -> CrossField:
+    """Move the singularities that are too close to the boundary to a better place.
+
+    Parameters
+    ----------
+    aligner : Aligner
+    clearance : Clearance
+    field : CrossField
+        Aligned and harmonic.
+    held : list of int
+        Singular vertices that do not move.
+    avoid : (n,) bool
+        Vertices that no singularity may be put on.
+
+    Returns
+    -------
+    CrossField
+        Aligned and harmonic, with as many singularities of the same indices.
+    """
+    mesh = aligner.mesh
+    vertices, index = singular_vertices(mesh, field.rotation)
+    here = mesh.points[vertices]
+    moving = ~np.isin(vertices, held)
+    moving[moving] = clearance.distance(here[moving])[0] < clearance.wanted(here[moving])
+    if not np.any(moving):
+        return field
+    pace = np.full(len(vertices), 0.25)
+    previous = np.zeros_like(here)
+    for _ in range(_ROUNDS):
+        here = mesh.points[vertices]
+        depth, _ = clearance.distance(here)
+        apart = np.hypot(*(here[:, None] - here[None]).transpose(2, 0, 1))
+        np.fill_diagonal(apart, np.inf)
+        clear = np.minimum(depth, 0.5 * apart.min(axis=1))
+        force = forces(mesh, field.rotation, here, 0.9 * clear)
+        turned = np.sum(force * previous, axis=1) < 0
+        pace = np.where(turned, 0.5 * pace, pace)
+        previous = force
+        step = force * (pace * clear**2 / (_UNIT * index**2))[:, None]
+        length = np.hypot(step[:, 0], step[:, 1])
+        step *= np.minimum(1.0, 0.5 * clear / np.maximum(length, np.finfo(float).tiny))[:, None]
+        goal = np.where(moving[:, None], here + step, here)
+        for _ in range(3):
+            depth, away = clearance.distance(goal)
+            short = np.maximum(clearance.wanted(goal) - depth, 0.0)
+            goal = np.where(moving[:, None], goal + short[:, None] * away, goal)
+        rotation = field.rotation.copy()
+        moved = False
+        for k in np.flatnonzero(moving).tolist():
+            barred = mesh.boundary_vertex | avoid
+            barred[np.delete(vertices, k)] = True
+            end = _go(mesh, rotation, int(vertices[k]), goal[k], int(index[k]), barred)
+            moved |= end != vertices[k]
+            vertices[k] = end
+        if not moved:
+            return field
+        field = aligner.rotate(replace(field, rotation=rotation))[0]
+    return field
