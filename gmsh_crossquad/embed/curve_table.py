@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..records import Curve, Float, Int
+from ..records import Bool, Curve, Float, Int
 
 __all__ = ["CurveTable"]
 
@@ -78,6 +78,8 @@ def _hermite(curve: Curve) -> tuple[Float, Float, Float, Float]:
     step = np.diff(curve.arclength)
     chord = np.diff(curve.points, axis=0) / step[:, None]
     tangent0, tangent1, kink = _tangents(chord, step, curve.closed)
+    if curve.tangents is not None:
+        tangent0[0], tangent1[-1] = curve.tangents[0], -curve.tangents[1]
     # A chord is shorter than its arc, never longer: unit tangents keep the speed right between the samples.
     tangent0 /= np.linalg.norm(tangent0, axis=1)[:, None]
     tangent1 /= np.linalg.norm(tangent1, axis=1)[:, None]
@@ -98,7 +100,7 @@ def _hermite(curve: Curve) -> tuple[Float, Float, Float, Float]:
     )
 
 
-def _tangents(chord: Float, step: Float, closed: bool) -> tuple[Float, Float, np.typing.NDArray[np.bool_]]:
+def _tangents(chord: Float, step: Float, closed: bool) -> tuple[Float, Float, Bool]:
     """Derivatives at both ends of every segment, and the samples (n,) that are kinks."""
     before, after = chord[:-1], chord[1:]
     h0, h1 = step[:-1, None], step[1:, None]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..records import Float, Guide, Int, Model
+from ..records import Bool, Float, Guide, Int, Model
 from .start import chain_arclengths, grid_edges
 
 __all__ = ["RestLengths", "rest_lengths"]
@@ -140,7 +140,7 @@ def _neighbours(guide: Guide, edges: Int, quad_edges: Int) -> Int:
     return np.concatenate([across, along, *on_curves])
 
 
-def _diffuse(own: Float, pairs: Int, held: np.typing.NDArray[np.bool_]) -> Float:
+def _diffuse(own: Float, pairs: Int, held: Bool) -> Float:
     n = len(own)
     i, j = np.concatenate([pairs, pairs[:, ::-1]]).T
     weight = ANCHOR + np.bincount(i, minlength=n)
@@ -150,7 +150,7 @@ def _diffuse(own: Float, pairs: Int, held: np.typing.NDArray[np.bool_]) -> Float
     return u
 
 
-def _limit(u: Float, pairs: Int, held: np.typing.NDArray[np.bool_]) -> Float:
+def _limit(u: Float, pairs: Int, held: Bool) -> Float:
     free = pairs[~held[pairs].any(axis=1)]
     i, j = np.concatenate([free, free[:, ::-1]]).T
     share = 1.0 / (1.0 + np.bincount(i, minlength=len(u)))

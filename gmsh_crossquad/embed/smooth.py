@@ -82,10 +82,10 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     """
     given = spread_chains(guide, model)
     rest = rest_lengths(given, model)
-    starts = (("given", lambda: given), ("laplace", lambda: laplace_start(given, model)))
     best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), "given", 0
-    for name, start in starts:
-        candidate, used, valid = _untangle(start(), model, rest)
+    for name in ("given", "laplace"):
+        start = given if name == "given" else laplace_start(given, model)
+        candidate, used, valid = _untangle(start, model, rest)
         rounds += used
         score = float(guide_quality(candidate, model).min())
         if score > quality or valid:
