@@ -1,8 +1,8 @@
 """How far a point of a plane face is from the boundary, and how far a singularity should be.
 
-A singularity close to the boundary makes a strip of thin blocks along it.  It should keep the distance ``min(0.4 rho, 0.6 R)``: rho is the
-radius of the largest disc inside the face that (widened by half) still reaches the point, R the perimeter over 2 pi of the hole beside
-it, so that a small hole gets a ring of its own size.
+A singularity close to the boundary makes a strip of thin blocks along it.  It should keep the distance
+``min(0.4 rho, 0.6 R)``: rho is the radius of the largest disc inside the face that (widened by half) still reaches the point,
+R the perimeter over 2 pi of the hole beside it, so that a small hole gets a ring of its own size.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ class Clearance:
     def _depth(self) -> tuple[Float, Float]:
         """Interior vertices (k, 2) and their distances (k,) from the boundary."""
         inside = self.mesh.points[~self.mesh.boundary_vertex]
-        return inside, self._tree.query(inside)[0]
+        return inside, np.asarray(self._tree.query(inside)[0])
 
     def distance(self, points: Float) -> tuple[Float, Float]:
         """(k,) distances from the boundary and (k, 2) unit vectors away from it."""
-        d, i = self._tree.query(points)
+        d, i = map(np.asarray, self._tree.query(points))
         away = points - self._samples[i]
         return d, away / np.maximum(d, np.finfo(float).tiny)[:, None]
 

@@ -1,12 +1,12 @@
 """The force that the smooth part of a cross field exerts on its singularities.
 
-The harmonic field of singularities at a_i has, up to a constant per core, the energy ``E(a) = 1/2 int |grad theta|^2``.  Its negative
-gradient is the configurational force (Eshelby 1951), a contour integral of ``W n - grad theta (grad theta . n)`` around a_i with
-``W = |grad theta|^2 / 2``, taken here as the area integral
+The harmonic field of singularities at a_i has, up to a constant per core, the energy ``E(a) = 1/2 int |grad theta|^2``.  Its
+negative gradient is the configurational force (Eshelby 1951), a contour integral of ``W n - grad theta (grad theta . n)``
+around a_i with ``W = |grad theta|^2 / 2``, taken here as the area integral
 
     f_i = int (grad theta (grad theta . grad eta) - W grad eta) dA,    eta = 1 near a_i and 0 beyond its clearance,
 
-which never looks at the core and is one sum over the triangles.
+which never looks at the core and is one sum over the vertices.
 """
 
 from __future__ import annotations
@@ -46,13 +46,14 @@ def forces(mesh: SurfaceMesh, rotation: Float, positions: Float, reach: Float) -
         Minus the derivative of the Dirichlet energy by the position.
     """
     g = gradient(mesh, rotation)
-    away = np.hypot(*(mesh.points[None] - positions[:, None]).transpose(2, 0, 1))
-    hat = np.clip((reach[:, None] - away) / (0.7 * reach[:, None]), 0.0, 1.0)
     p = mesh.points[mesh.triangles]
     d = np.roll(p, -1, axis=1) - p
-    # gradient of the barycentric coordinate of vertex k + 2, opposite of edge k
-    slope = np.stack([-d[..., 1], d[..., 0]], axis=2) / (2 * mesh.area)[:, None, None]
-    eta = np.einsum("itk,tkc->itc", hat[:, np.roll(mesh.triangles, -2, axis=1)], slope)
-    along = np.einsum("tc,itc->it", g, eta)
+    # area times the gradient of the barycentric coordinate of vertex k + 2, which is opposite of edge k
+    slope = 0.5 * np.stack([-d[..., 1], d[..., 0]], axis=2)
     density = 0.5 * np.sum(g * g, axis=1)
-    return np.einsum("t,it,tc->ic", mesh.area, along, g) - np.einsum("t,t,itc->ic", mesh.area, density, eta)
+    part = np.sum(slope * g[:, None], axis=2)[..., None] * g[:, None] - density[:, None, None] * slope
+    opposite = np.roll(mesh.triangles, -2, axis=1).ravel()
+    nodal = [np.bincount(opposite, part[..., c].ravel(), len(mesh.points)) for c in range(2)]
+    away = np.hypot(*(mesh.points[None] - positions[:, None]).transpose(2, 0, 1))
+    hat = np.clip((reach[:, None] - away) / (0.7 * reach[:, None]), 0.0, 1.0)
+    return hat @ np.stack(nodal, axis=1)

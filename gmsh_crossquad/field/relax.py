@@ -1,12 +1,13 @@
 """Move singularities to where the aligned field is smooth and blocks are not thin.
 
-The smooth field has thick cores and places singularities well, except that it puts them close to holes and corners.  Those that
-are too close to the boundary move: every round solves once, moves each of them along its force (see `forces`) by at most half its clearance, and then away from the
-boundary to the distance it should keep (see `clearance`).  Positions are continuous; the index sits at the vertex nearest to them and is
-moved by whole quarter turns along edges, so that no round can change what the indices add up to.
+The smooth field has thick cores and places singularities well, except that it puts some close to holes and corners.  Those
+that are too close to the boundary move: every round solves once, moves each of them along its force (see `forces`) by at most
+half its clearance, and then away from the boundary to the distance it should keep (see `clearance`).  The index sits at the
+vertex nearest to the position so found and is moved by whole quarter turns along edges, so that no round can change what the
+indices add up to.
 
-A singularity that a corner would absorb, because its field alone prefers another number of quads there, is not left to the force: it
-goes onto the corner's bisector, at 0.6 of the length over which the sector is free, and stays there.
+A singularity that a corner would absorb, because the field alone prefers another number of quads there, is not left to the
+force: it goes onto the corner's bisector, at 0.6 of the length over which the sector is free, and stays there.
 """
 
 from __future__ import annotations
@@ -26,14 +27,7 @@ __all__ = ["cancel_pairs", "leave_corners", "relax_singularities"]
 
 #: energy that a quarter-turn singularity gains per factor e of core size
 _UNIT = np.pi / 16
-_ROUNDS = 10
-
-
-def _go(mesh: SurfaceMesh, rotation: Float, vertex: int, goal: Float, amount: int, barred: Bool) -> int:
-    """Move the index `amount` of `vertex` along edges towards `goal`, in place; where it is then."""
-    path = walk(mesh, vertex, goal, barred)
-    move_index(mesh, rotation, path, amount)
-    return path[-1]
+_ROUNDS = 8
 
 
 def cancel_pairs(aligner: Aligner, field: CrossField, reach: float = 4.0) -> CrossField:
@@ -52,7 +46,6 @@ def cancel_pairs(aligner: Aligner, field: CrossField, reach: float = 4.0) -> Cro
     """
     mesh, operators = aligner.mesh, aligner.operators
     local = np.sqrt(2.0 * mesh.area.mean())
-    barred = mesh.boundary_vertex
     kept: set[tuple[int, int]] = set()
     for _ in range(100):
         vertices, index = singular_vertices(mesh, field.rotation)
@@ -68,9 +61,10 @@ def cancel_pairs(aligner: Aligner, field: CrossField, reach: float = 4.0) -> Cro
         _, i, j = min(pairs)
         kept.add((int(vertices[i]), int(vertices[j])))
         rotation = field.rotation.copy()
-        end = _go(mesh, rotation, int(vertices[i]), p[j], min(int(index[i]), -int(index[j])), barred)
-        if end != vertices[j]:
+        path = walk(mesh, int(vertices[i]), p[j], mesh.boundary_vertex)
+        if path[-1] != vertices[j]:
             continue
+        move_index(mesh, rotation, path, min(int(index[i]), -int(index[j])))
         merged = aligner.rotate(replace(field, rotation=rotation))[0]
         if operators.energy(merged.rotation) < operators.energy(field.rotation):
             field = merged
@@ -120,7 +114,9 @@ def leave_corners(
             k = int(near[np.argmin(distance[near])])
             barred = mesh.boundary_vertex | avoid
             barred[np.delete(vertices, k)] = True
-            vertices[k] = _go(mesh, out, int(vertices[k]), origin + 0.6 * free * direction, int(index[k]), barred)
+            path = walk(mesh, int(vertices[k]), origin + 0.6 * free * direction, barred)
+            move_index(mesh, out, path, int(index[k]))
+            vertices[k] = path[-1]
             if pull[sign] > _UNIT:
                 held.append(int(vertices[k]))
     return out, held
@@ -129,7 +125,7 @@ def leave_corners(
 def attraction(angle: float, quads: int, sign: int) -> float:
     """Energy per factor e of distance that a corner with `quads` quads loses by absorbing a singularity of this sign.
 
-    A sector of opening angle b with n quads turns the field by ``n pi/2 - b``, which costs ``(n pi/2 - b)^2 / (2 b)`` per factor e.
+    A sector of opening angle b with n quads turns the field by ``n pi/2 - b``, which costs ``(n pi/2 - b)^2 / (2 b)``.
     """
     before, after = quads * QUARTER - angle, (quads - sign) * QUARTER - angle
     return (before**2 - after**2) / (2.0 * angle)
@@ -176,20 +172,25 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
         step = force * (pace * clear**2 / (_UNIT * index**2))[:, None]
         length = np.hypot(step[:, 0], step[:, 1])
         step *= np.minimum(1.0, 0.5 * clear / np.maximum(length, np.finfo(float).tiny))[:, None]
-        goal = np.where(moving[:, None], here + step, here)
+        goal = here + step
+        wanted = clearance.wanted(here)
         for _ in range(3):
             depth, away = clearance.distance(goal)
-            short = np.maximum(clearance.wanted(goal) - depth, 0.0)
-            goal = np.where(moving[:, None], goal + short[:, None] * away, goal)
+            goal += np.maximum(wanted - depth, 0.0)[:, None] * away
         rotation = field.rotation.copy()
-        moved = False
+        barred = mesh.boundary_vertex | avoid
+        barred[vertices] = True
+        longest = 0
         for k in np.flatnonzero(moving).tolist():
-            barred = mesh.boundary_vertex | avoid
-            barred[np.delete(vertices, k)] = True
-            end = _go(mesh, rotation, int(vertices[k]), goal[k], int(index[k]), barred)
-            moved |= end != vertices[k]
-            vertices[k] = end
-        if not moved:
+            path = walk(mesh, int(vertices[k]), goal[k], barred)
+            move_index(mesh, rotation, path, int(index[k]))
+            barred[vertices[k]] = avoid[vertices[k]]
+            vertices[k] = path[-1]
+            barred[vertices[k]] = True
+            longest = max(longest, len(path) - 1)
+        if longest == 0:
             return field
         field = aligner.rotate(replace(field, rotation=rotation))[0]
+        if longest == 1:
+            return field
     return field
