@@ -1,0 +1,20 @@
+// A plate with an inclined crack: a line embedded in the surface, followed by the mesh.
+h = 0.05;
+Point(1) = {0, 0, 0, h};
+Point(2) = {2, 0, 0, h};
+Point(3) = {2, 1, 0, h};
+Point(4) = {0, 1, 0, h};
+Point(5) = {0.7, 0.4, 0, h};
+Point(6) = {1.3, 0.6, 0, h};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 4};
+Line(4) = {4, 1};
+Line(5) = {5, 6};
+Curve Loop(1) = {1, 2, 3, 4};
+Plane Surface(1) = {1};
+Curve{5} In Surface{1};
+Physical Surface("plate", 1) = {1};
+Physical Curve("crack", 2) = {5};
+Physical Curve("top", 3) = {3};
+Physical Curve("bottom", 4) = {1};

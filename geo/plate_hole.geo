@@ -1,0 +1,26 @@
+// A square plate with a central hole, in Gmsh's own kernel: the hole is made of four arcs.
+h = 0.06;
+r = 0.25;
+Point(1) = {-1, -1, 0, h};
+Point(2) = {1, -1, 0, h};
+Point(3) = {1, 1, 0, h};
+Point(4) = {-1, 1, 0, h};
+Point(5) = {0, 0, 0, h};
+Point(6) = {r, 0, 0, h};
+Point(7) = {0, r, 0, h};
+Point(8) = {-r, 0, 0, h};
+Point(9) = {0, -r, 0, h};
+Line(1) = {1, 2};
+Line(2) = {2, 3};
+Line(3) = {3, 4};
+Line(4) = {4, 1};
+Circle(5) = {6, 5, 7};
+Circle(6) = {7, 5, 8};
+Circle(7) = {8, 5, 9};
+Circle(8) = {9, 5, 6};
+Curve Loop(1) = {1, 2, 3, 4};
+Curve Loop(2) = {5, 6, 7, 8};
+Plane Surface(1) = {1, 2};
+Physical Surface("plate", 1) = {1};
+Physical Curve("outside", 2) = {1, 2, 3, 4};
+Physical Curve("hole", 3) = {5, 6, 7, 8};

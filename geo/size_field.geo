@@ -1,0 +1,20 @@
+// A channel with a size field: fine near the round obstacle, coarse far away.
+SetFactory("OpenCASCADE");
+Rectangle(1) = {0, 0, 0, 4, 1.2};
+Disk(2) = {1, 0.6, 0, 0.2};
+BooleanDifference(3) = { Surface{1}; Delete; }{ Surface{2}; Delete; };
+eps = 1e-3;
+obstacle() = Curve In BoundingBox {0.8 - eps, 0.4 - eps, -eps, 1.2 + eps, 0.8 + eps, eps};
+Field[1] = Distance;
+Field[1].CurvesList = {obstacle()};
+Field[1].Sampling = 100;
+Field[2] = Threshold;
+Field[2].InField = 1;
+Field[2].SizeMin = 0.03;
+Field[2].SizeMax = 0.12;
+Field[2].DistMin = 0.1;
+Field[2].DistMax = 1.5;
+Background Field = 2;
+Mesh.MeshSizeExtendFromBoundary = 0;
+Physical Surface("fluid", 1) = {3};
+Physical Curve("obstacle", 2) = {obstacle()};
