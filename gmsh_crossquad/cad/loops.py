@@ -122,19 +122,22 @@ def _direct(
 
 
 def _side(points: Float, a: Float, b: Float) -> int:
-    """+1 if the face is on the left of a curve: parity of the crossings of a ray to the left of its longest segment."""
+    """+1 if the face is on the left of a curve: parity of the crossings of a ray from its longest segment.
+
+    The ray starts in the middle of the segment along the coordinate axis that is more across it.
+    """
     d = np.diff(points, axis=0)
     k = int(np.argmax((d**2).sum(1)))
+    across = int(abs(d[k, 1]) < abs(d[k, 0]))
+    x, y = 1 - across, across
     middle = 0.5 * (points[k] + points[k + 1])
-    along = d[k] / np.hypot(*d[k])
-    left = np.array([-along[1], along[0]])
-    xa, xb = (a - middle) @ along, (b - middle) @ along
-    ya, yb = (a - middle) @ left, (b - middle) @ left
-    own = (a == points[k]).all(1) & (b == points[k + 1]).all(1)
-    cross = ((xa > 0) != (xb > 0)) & ~own
-    xa, xb, ya, yb = xa[cross], xb[cross], ya[cross], yb[cross]
-    height = ya - xa * (yb - ya) / (xb - xa)
-    return 1 if int((height > 0).sum()) % 2 else -1
+    rows = np.flatnonzero((a[:, x] > middle[x]) != (b[:, x] > middle[x]))
+    rows = rows[((a[rows] != points[k]) | (b[rows] != points[k + 1])).any(1)]
+    p, q = a[rows], b[rows]
+    height = p[:, y] + (middle[x] - p[:, x]) * (q[:, y] - p[:, y]) / (q[:, x] - p[:, x])
+    inside = int((height > middle[y]).sum()) % 2 == 1  # on the side to which coordinate y grows
+    left = (d[k, x] > 0) if across else (d[k, x] < 0)
+    return 1 if inside == left else -1
 
 
 def _followers(

@@ -10,9 +10,9 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from .session import gmsh_errors
 from ..errors import GeometryError
 from ..records import Float
+from .session import gmsh_errors
 
 __all__ = ["face_plane"]
 
@@ -63,9 +63,9 @@ def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> 
 
 def _newell(boundary: list[Float], centre: Float) -> tuple[Float, float]:
     """Unit normal (zero where the area is) and area of the polygon that the boundary curves make."""
-    vector = np.zeros(3)
-    for p in boundary:
-        vector += 0.5 * np.cross(p[:-1] - centre, p[1:] - centre).sum(0)
+    p = np.concatenate([curve[:-1] for curve in boundary]) - centre
+    q = np.concatenate([curve[1:] for curve in boundary]) - centre
+    vector = 0.5 * np.array([p[:, i] @ q[:, j] - p[:, j] @ q[:, i] for i, j in ((1, 2), (2, 0), (0, 1))])
     area = float(np.linalg.norm(vector))
     return (vector / area if area > 0 else vector), area
 

@@ -12,15 +12,15 @@ from dataclasses import dataclass, field
 import gmsh
 import numpy as np
 
+from ..errors import GeometryError
+from ..options import MeshOptions
+from ..records import Curve, Face, Float, Model
 from .loops import boundary_loops
 from .plane import face_plane
 from .sample import refine, sample
 from .session import gmsh_errors
 from .tangents import cad_tangents
 from .transfinite import transfinite_spacing
-from ..errors import GeometryError
-from ..options import MeshOptions
-from ..records import Curve, Face, Float, Model
 
 __all__ = ["read_model"]
 
@@ -32,6 +32,7 @@ class _Raw:
     """A curve in the user's coordinates."""
 
     tag: int
+    kind: str
     ends: list[int]
     parameters: Float
     points: Float
@@ -79,8 +80,8 @@ def read_model(options: MeshOptions) -> Model:
     del options  # nothing that is read depends on them so far
     with gmsh_errors("reading the model"):
         tags = _wanted_faces()
-        bounds = {f: [abs(c) for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=True)] for f in tags}
         signs = {f: [c for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=True)] for f in tags}
+        bounds = {f: [abs(c) for c in signs[f]] for f in tags}
         embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
     for f in tags:
         if not bounds[f]:
@@ -96,7 +97,7 @@ def read_model(options: MeshOptions) -> Model:
     if not scale > 0:
         raise GeometryError("the surface has no extent", entity=(2, tags[0]), remedy="remove it")
     for r in raw:
-        r.parameters, r.points = refine(r.tag, r.parameters, r.points, scale)
+        r.parameters, r.points = refine(r.tag, r.kind, r.parameters, r.points, scale)
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
     kept = [r for r in raw if not _degenerate(r, scale)]
@@ -153,20 +154,20 @@ def _box(points: list[Float]) -> tuple[Float, Float]:
 
 def _read_curve(tag: int, vertices: _Vertices) -> _Raw:
     """First samples of a curve, between its CAD vertices."""
-    parameters, points = sample(tag)
     with gmsh_errors("reading", entity=(1, tag)):
+        kind = gmsh.model.getType(1, tag)
         tags = [int(p) for _, p in gmsh.model.getBoundary([(1, tag)], combined=False, oriented=False)]
         ends = [vertices.cad(p) for p in tags]
+    parameters, points = sample(tag, kind)
     if not ends:
         ends = [vertices.made(points[0])]
     if len(ends) == 1:
         ends = ends * 2
-    first, last = vertices.points[ends[0]], vertices.points[ends[1]]
-    apart = [np.linalg.norm(points[i] - p) for i, p in ((0, first), (-1, last), (0, last), (-1, first))]
-    if apart[2] + apart[3] < apart[0] + apart[1]:
-        ends, first, last = ends[::-1], last, first
-    points[0], points[-1] = first, last
-    return _Raw(tag, ends, parameters, points)
+    snap = np.array([vertices.points[p] for p in ends])
+    if ((points[[0, -1]] - snap[::-1]) ** 2).sum() < ((points[[0, -1]] - snap) ** 2).sum():
+        ends, snap = ends[::-1], snap[::-1]
+    points[[0, -1]] = snap
+    return _Raw(tag, kind, ends, parameters, points)
 
 
 def _degenerate(raw: _Raw, scale: float) -> bool:
@@ -179,7 +180,7 @@ def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Cur
     arclength = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(1)))])
     if spacing is not None:
         spacing = np.interp(spacing, raw.parameters, arclength)
-    tangents = cad_tangents(raw.tag, raw.parameters, points)
+    tangents = cad_tangents(raw.tag, raw.kind, raw.parameters, points)
     return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing, tangents)
 
 

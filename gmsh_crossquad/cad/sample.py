@@ -11,9 +11,9 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from .session import gmsh_errors
 from ..errors import GeometryError
 from ..records import Bool, Float, Int
+from .session import gmsh_errors
 
 __all__ = ["evaluate", "refine", "sample"]
 
@@ -31,13 +31,15 @@ def evaluate(tag: int, parameters: Float) -> Float:
         return np.asarray(gmsh.model.getValue(1, tag, np.ascontiguousarray(parameters))).reshape(-1, 3)
 
 
-def sample(tag: int) -> tuple[Float, Float]:
+def sample(tag: int, kind: str) -> tuple[Float, Float]:
     """First, coarse samples of a curve.
 
     Parameters
     ----------
     tag : int
         Gmsh tag of the curve.
+    kind : str
+        Gmsh type of the curve.
 
     Returns
     -------
@@ -50,7 +52,6 @@ def sample(tag: int) -> tuple[Float, Float]:
     GeometryError
         Where the curve cannot be evaluated.
     """
-    kind = gmsh.model.getType(1, tag)
     if kind.startswith("Discrete"):
         return _mesh_chain(tag)
     lo, hi = gmsh.model.getParametrizationBounds(1, tag)
@@ -94,19 +95,21 @@ def _coarse(a: Float, m: Float, b: Float, scale: float) -> Bool:
     chord, first, second = b - a, m - a, b - m
     size = np.sqrt((chord**2).sum(1))
     one, two = np.sqrt((first**2).sum(1)), np.sqrt((second**2).sum(1))
-    normal = np.sqrt((np.cross(first, second) ** 2).sum(1))
+    along = (first * second).sum(1)
+    normal = np.sqrt(np.maximum((one * two) ** 2 - along**2, 0.0))
     deviation = np.divide(normal, size, out=np.maximum(one, two), where=size > 0)
-    turning = np.arctan2(normal, (first * second).sum(1))
+    turning = np.arctan2(normal, along)
     longer = np.maximum(one, two) > SHORTEST * scale
     return ((deviation > 4 * DEVIATION * scale) | (turning > TURNING)) & longer
 
 
-def refine(tag: int, parameters: Float, points: Float, scale: float) -> tuple[Float, Float]:
+def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) -> tuple[Float, Float]:
     """Bisect the first samples of a curve until they stand for it.
 
     Parameters
     ----------
     tag : int
+    kind : str
     parameters : (n,) float64; points : (n, 3) float64
         From `sample`.
     scale : float
@@ -116,7 +119,6 @@ def refine(tag: int, parameters: Float, points: Float, scale: float) -> tuple[Fl
     -------
     parameters : (m,) float64; points : (m, 3) float64
     """
-    kind = gmsh.model.getType(1, tag)
     if kind == "Line" or kind.startswith("Discrete"):
         return parameters, points
     check = np.ones(len(parameters) - 1, bool)

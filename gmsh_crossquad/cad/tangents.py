@@ -14,7 +14,7 @@ import itertools
 import gmsh
 import numpy as np
 
-from ..records import Curve, Float, Model
+from ..records import Curve, Face, Float, Model
 from .sample import evaluate
 from .session import gmsh_errors
 
@@ -32,25 +32,27 @@ def _unit(v: Float) -> Float:
     return np.divide(v, size, out=np.zeros_like(v), where=size > 0)
 
 
-def cad_tangents(tag: int, parameters: Float, points: Float) -> Float | None:
+def cad_tangents(tag: int, kind: str, parameters: Float, points: Float) -> Float | None:
     """Unit directions in which a curve of the current Gmsh model leaves its ends.
 
     Parameters
     ----------
     tag : int
+    kind : str
+        Gmsh type of the curve.
     parameters : (n,) float64; points : (n, 3) float64
         Its samples.
 
     Returns
     -------
     (2, 3) float64 or None
-        From the start and from the end, both pointing into the curve.  None for straight and discrete curves, whose
-        samples say all.
+        From the start and from the end, both pointing into the curve.  None for discrete curves, whose samples say all.
     """
-    kind = gmsh.model.getType(1, tag)
-    if kind == "Line" or kind.startswith("Discrete"):
+    if kind.startswith("Discrete"):
         return None
-    chords = _unit(np.stack([points[1] - points[0], points[-2] - points[-1]]))
+    chords = _unit(points[[1, -2]] - points[[0, -1]])
+    if kind == "Line":
+        return chords
     with gmsh_errors("differentiating", entity=(1, tag)):
         derivative = np.asarray(gmsh.model.getDerivative(1, tag, parameters[[0, -1]])).reshape(2, 3)
     tangents = _unit(derivative * [[1.0], [-1.0]])
@@ -107,10 +109,11 @@ def end_directions(model: Model, face_row: int) -> dict[tuple[int, int], float]:
     """
     face = model.faces[face_row]
     out: dict[tuple[int, int], float] = {}
-    for row in dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)):
-        flat = end_tangents(model.curves[row]) @ face.axes.T
-        for end in (0, 1):
-            out[row, end] = float(np.arctan2(flat[end, 1], flat[end, 0]))
+    rows = list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
+    flat = np.array([end_tangents(model.curves[row]) for row in rows]) @ face.axes.T
+    angles = np.arctan2(flat[..., 1], flat[..., 0]).tolist()
+    for row, (start, end) in zip(rows, angles):
+        out[row, 0], out[row, 1] = start, end
     return out
 
 
@@ -125,34 +128,51 @@ def sector_angles(model: Model, face_row: int) -> tuple[Float, ...]:
     Returns
     -------
     tuple of (k,) float64, one per loop
-        Entry i is the angle in [0, 2 pi] measured inside the face between curve i - 1 and curve i of the loop.  Where
-        both leave in nearly one direction the sampled curves tell a cusp (near 0) from a slit (near 2 pi).  Embedded
-        curves that end in the corner are not regarded: they divide the angle.
+        Entry i is the angle in [0, 2 pi] measured inside the face between curve i - 1 and curve i of the loop.
+        Embedded curves that end in the corner are not regarded: they divide the angle.
+
+    Notes
+    -----
+    Where both curves leave in one direction (within `NARROW`) the angle is near 0 (a cusp) or near 2 pi (a crack, the
+    outside of a lens).  The turning of a simple loop tells which: its corners and curves turn by 2 pi together, a
+    hole by - 2 pi.  Where a loop has both kinds the chords at some distance decide.
     """
     face = model.faces[face_row]
     directions = end_directions(model, face_row)
     out = []
-    for loop in face.loops:
-        angles = np.zeros(len(loop))
-        for i, (c, sign) in enumerate(loop):
-            before, before_sign = loop[i - 1]
-            away, back = (c, 0 if sign > 0 else 1), (before, 1 if before_sign > 0 else 0)
-            angle = (directions[back] - directions[away]) % (2 * np.pi)
-            if min(angle, 2 * np.pi - angle) < NARROW:
-                shown = _shown(model, face_row, away, back)
-                angle += 2 * np.pi * np.round((shown - angle) / (2 * np.pi))
-            angles[i] = min(max(angle, 0.0), 2 * np.pi)
-        out.append(angles)
+    for row, loop in enumerate(face.loops):
+        away = [(c, 0 if sign > 0 else 1) for c, sign in loop]
+        back = [(c, 1 if sign > 0 else 0) for c, sign in loop[-1:] + loop[:-1]]
+        angles = np.array([directions[b] - directions[a] for a, b in zip(away, back)]) % (2 * np.pi)
+        narrow = np.minimum(angles, 2 * np.pi - angles) < NARROW
+        if narrow.any():
+            angles[narrow] = (angles[narrow] + np.pi) % (2 * np.pi) - np.pi
+            turned = sum(sign * _turning(model.curves[c], face, directions[c, 0], directions[c, 1]) for c, sign in loop)
+            turned += (np.pi - angles).sum() - (2 * np.pi if row == 0 else -2 * np.pi)
+            opened = round(float(turned) / (2 * np.pi))
+            if opened == narrow.sum():
+                angles[narrow] += 2 * np.pi
+            elif opened != 0:
+                for i in np.flatnonzero(narrow):
+                    angles[i] += 2 * np.pi * round((_shown(model, face, away[i], back[i]) - angles[i]) / (2 * np.pi))
+        out.append(np.clip(angles, 0.0, 2 * np.pi))
     return tuple(out)
 
 
-def _shown(model: Model, face_row: int, away: tuple[int, int], back: tuple[int, int]) -> float:
+def _turning(curve: Curve, face: Face, start: float, end: float) -> float:
+    """Angle by which a curve turns from its tangent at the start to that at the end."""
+    d = np.diff(face.local(curve.points), axis=0)
+    angle = np.concatenate([[start], np.arctan2(d[:, 1], d[:, 0]), [end + np.pi]])
+    return float(((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi).sum())
+
+
+def _shown(model: Model, face: Face, away: tuple[int, int], back: tuple[int, int]) -> float:
     """Angle between the chords of two curve ends at a small common distance."""
     reach = 0.05 * min(model.curves[away[0]].length, model.curves[back[0]].length)
     angle = []
     for row, end in (back, away):
         curve = model.curves[row]
         points = curve.at(np.array([0.0, reach]) if end == 0 else np.array([curve.length, curve.length - reach]))
-        d = (points[1] - points[0]) @ model.faces[face_row].axes.T
+        d = (points[1] - points[0]) @ face.axes.T
         angle.append(np.arctan2(d[1], d[0]))
     return float((angle[0] - angle[1]) % (2 * np.pi))
