@@ -1,0 +1,188 @@
+"""The picture of a result as plain arrays: panels of coloured cells, lines and markers, for any drawing library.
+
+Everything is turned into the view's frame (x right, y up, z to the viewer).  A planar model is looked at along its normal,
+any other one from a corner.  Colours are those of Okabe and Ito, which colour-blind people can tell apart; singularities also
+differ in shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..embed.quality import scaled_jacobian
+from ..records import Float, Int
+
+if TYPE_CHECKING:
+    from ..result import FaceField, Layout, MeshResult
+
+__all__ = ["Lines", "Markers", "Panel", "Scene", "build_scene"]
+
+BLUE, VERMILLION, INK, GREY = (0, 114, 178), (213, 94, 0), (30, 34, 40), (150, 158, 168)
+PAPER = (246, 247, 249)
+TINTS = ((86, 180, 233), (230, 159, 0), (0, 158, 115), (204, 121, 167), (240, 228, 66), (213, 94, 0), (0, 114, 178))
+WORST = 0.3
+"""Scaled Jacobian that gets the full warning colour."""
+CROSSES = 30
+"""Crosses along the longer side of a picture."""
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Segments (k, 2, 3) of one colour (red, green, blue, 0 to 255) and width in points."""
+
+    segments: Float
+    colour: tuple[int, int, int]
+    width: float
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Points (k, 3) drawn as discs or, if `square`, squares of `size` points."""
+
+    points: Float
+    colour: tuple[int, int, int]
+    size: float
+    square: bool = False
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One drawing: cells (m, 3 or 4) over points (n, 3) with colours (m, 3), lines and markers on top."""
+
+    title: str
+    points: Float
+    cells: Int
+    colours: Int
+    lines: tuple[Lines, ...]
+    markers: tuple[Markers, ...] = ()
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Panels with a common extent: (low, high) corners, (2, 2)."""
+
+    panels: tuple[Panel, ...]
+    extent: Float
+
+
+def _frame(normals: Float) -> Float:
+    """Rows: right, up, towards the viewer."""
+    mean = normals[0]
+    if np.all(np.abs(normals @ mean) > 0.999):
+        view = mean * (1.0 if mean[np.argmax(np.abs(mean))] > 0 else -1.0)
+    else:
+        view = np.array([1.0, -1.4, 0.9])
+        view /= np.linalg.norm(view)
+    up = np.array([0.0, 0.0, 1.0]) if abs(view[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(up, view)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(view, right), view])
+
+
+def _polyline_segments(lines: Iterable[Float]) -> Float:
+    parts = [np.stack([p[:-1], p[1:]], axis=1) for p in lines]
+    return np.concatenate(parts) if parts else np.zeros((0, 2, 3))
+
+
+def _block_colours(layout: Layout) -> Int:
+    """A light tint (b, 3) for every block, different from its neighbours' where seven tints are enough."""
+    around: dict[int, list[int]] = {}
+    for i, block in enumerate(layout.blocks):
+        for edge, _ in block.sides:
+            around.setdefault(edge, []).append(i)
+    chosen = np.full(len(layout.blocks), -1, np.int64)
+    for i, block in enumerate(layout.blocks):
+        taken = {int(chosen[j]) for edge, _ in block.sides for j in around[edge]}
+        free = [k for k in range(len(TINTS)) if k not in taken]
+        chosen[i] = free[0] if free else i % len(TINTS)
+    return (0.45 * np.array(TINTS)[chosen] + 0.55 * 255).astype(np.int64)
+
+
+def _quality_colours(value: Float) -> Int:
+    """From pale blue (1) to vermillion (`WORST` and below)."""
+    bad = np.minimum(np.maximum((1.0 - value) / (1.0 - WORST), 0.0), 1.0)[:, None]
+    return ((1 - bad) * np.array([228, 240, 249]) + bad * np.array(VERMILLION)).astype(np.int64)
+
+
+def _crosses(fields: tuple[FaceField, ...], cell: float, frame: Float) -> Float:
+    """Arms (k, 2, 3) of about one cross per cell of a square grid."""
+    out = []
+    for f in fields:
+        bins = np.floor(f.places @ frame[:2].T / cell).astype(np.int64)
+        rows = np.sort(np.unique(bins, axis=0, return_index=True)[1])
+        for arm in (f.directions[rows], np.cross(f.normal, f.directions[rows])):
+            out.append(np.stack([f.places[rows] - 0.36 * cell * arm, f.places[rows] + 0.36 * cell * arm], axis=1))
+    return np.concatenate(out) if out else np.zeros((0, 2, 3))
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n:,} {what}" + ("" if n == 1 else "s")
+
+
+def build_scene(result: MeshResult) -> Scene:
+    """The three panels of a result: cross field, block layout, mesh.
+
+    Parameters
+    ----------
+    result : MeshResult
+
+    Returns
+    -------
+    Scene
+    """
+    mesh, layout, quality = result.mesh, result.layout, result.quality
+    frame = _frame(result.normals)
+    points = mesh.points @ frame.T
+    low, high = points.min(axis=0), points.max(axis=0)
+    cell = float((high - low)[:2].max()) / CROSSES
+    outline = _polyline_segments(e.points @ frame.T for e in layout.edges if e.curve is not None)
+    inner = _polyline_segments(e.points @ frame.T for e in layout.edges if e.curve is None)
+    start, end = mesh.quads, np.roll(mesh.quads, -1, axis=1)
+    keep = (start < end).ravel()
+    grid = np.stack([points[start.ravel()[keep]], points[end.ravel()[keep]]], axis=1)
+    spots = []
+    counts = []
+    for sign, colour, square, label in ((1, VERMILLION, False, "+"), (-1, BLUE, True, "−")):
+        chosen = [s.point for s in result.singularities if s.index * sign > 0]
+        if chosen:
+            spots.append(Markers(np.array(chosen) @ frame.T, colour, 9.0, square))
+        counts.append(f"{len(chosen)} {label}¼")
+    tints = _block_colours(layout)
+    fields = result.field
+    offset = np.cumsum([0, *(len(f.points) for f in fields)])
+    ground = np.concatenate([f.points for f in fields]) @ frame.T
+    triangles = np.concatenate([f.triangles + o for f, o in zip(fields, offset[:-1], strict=True)])
+    flat = np.tile(np.array(PAPER), (len(triangles), 1))
+    order = np.unique(mesh.quad_block, return_inverse=True)[1]
+    value = scaled_jacobian(mesh.points, mesh.quads, result.normals[mesh.quad_face])
+    panels = (
+        Panel(
+            f"cross field: singularities {counts[0]}, {counts[1]}",
+            ground,
+            triangles,
+            flat,
+            (Lines(_crosses(fields, cell, frame) @ frame.T, BLUE, 1.1), Lines(outline, INK, 2.0)),
+            tuple(spots),
+        ),
+        Panel(
+            f"layout: {_count(quality.blocks, 'block')}",
+            points,
+            mesh.quads,
+            tints[order],
+            (Lines(inner, INK, 1.2), Lines(outline, INK, 2.0)),
+            tuple(spots),
+        ),
+        Panel(
+            f"mesh: {_count(quality.quads, 'quad')}, scaled Jacobian min {quality.min_scaled_jacobian:.2f}, "
+            f"mean {quality.mean_scaled_jacobian:.2f}",
+            points,
+            mesh.quads,
+            _quality_colours(value),
+            (Lines(grid, GREY, 0.5), Lines(inner, BLUE, 1.0), Lines(outline, INK, 1.8)),
+        ),
+    )
+    return Scene(panels, np.stack([low[:2], high[:2]]))
