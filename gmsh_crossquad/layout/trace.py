@@ -1,0 +1,299 @@
+"""The motorcycle graph of a face: separatrices that grow together and stop where they meet one another.
+
+A trace crosses triangles in straight chords.  Two chords of a triangle cross if and only if their ends alternate around its
+rim, so all is decided by the *order of crossings along edges*, held as integers (fractions of 2^-48, exact on both sides of
+an edge); coordinates only propose where to go.  With the branches of `trace_mesh` the following holds by construction:
+
+* Chords of one family (branches that differ by 0 or 2) never cross: a chord that would is led out beside the other one.
+* Chords of different families cross only the right way round: branch ``b + 1`` passes ``b`` from right to left.  The younger
+  stops there (T-junction).
+* A boundary edge is left only straight outwards; a trace that runs along the boundary passes the edge at its end.
+
+Therefore every patch without a singularity inside has four corners, however coarse or bent the field is (discrete
+Gauss–Bonnet: going around it, the branch turns by four quarters).
+
+References
+----------
+D. Eppstein, M. T. Goodrich, E. Kim, R. Tamstorf, *Motorcycle graphs: canonical quad mesh partitioning*, 2008.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import hypot
+from typing import NamedTuple
+
+from ..errors import LayoutError
+from .ports import SLIDE, Port
+from .step import ideal_exit
+from .trace_mesh import TraceMesh, next_of, previous_of
+
+__all__ = ["ONE", "Chord", "Trace", "grow"]
+
+ONE = 1 << 48
+"""Length of an edge in integer places."""
+
+AROUND = 3 * ONE
+
+BESIDE = ONE // 20
+"""Distance that a chord keeps where it is led out beside an obstacle, if there is room."""
+
+NUDGE = ONE >> 14
+"""Step to a free place where the wanted one is taken."""
+
+TRIES = 16
+"""Bound on the attempts to find a free place."""
+
+
+class Chord(NamedTuple):
+    """A trace in one triangle.
+
+    Attributes
+    ----------
+    a, b : int
+        Entry and exit on the triangle's rim, ``k ONE + place``; a seed's chord starts at a corner ``k ONE``.
+    branch : int
+    trace, segment : int
+        Whose chord it is, and the how-many-th of it.
+    host : Chord or None
+        The chord that stops this one: it ends there, not at `b`.
+    """
+
+    a: int
+    b: int
+    branch: int
+    trace: int
+    segment: int
+    host: Chord | None
+
+
+@dataclass
+class Trace:
+    """One separatrix.
+
+    Attributes
+    ----------
+    seed, port : int
+        Background vertex, and which of its ports.
+    crossings : list of (half-edge, place)
+        Where its chords leave their triangles, in order; the last one only on paper if it ends inside the triangle.
+    host : Chord or None
+        Chord that it ends on; None at the boundary.
+    last : Chord or None
+        Its own last chord.
+    along, across : float
+        Fractions of the host's and of its own last chord where they meet.
+    """
+
+    seed: int
+    port: int
+    crossings: list[tuple[int, int]] = field(default_factory=list)
+    host: Chord | None = None
+    last: Chord | None = None
+    along: float = 0.0
+    across: float = 0.0
+
+
+def on_left(chord: Chord, place: int) -> bool:
+    """Is a place of the triangle's rim on the left of a chord?"""
+    return (chord.a - place) % AROUND < (chord.b - place) % AROUND
+
+
+def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Sequence[Port]]], max_steps: int) -> list[Trace]:
+    """Grow all separatrices until each has met another one or the boundary.
+
+    Parameters
+    ----------
+    mesh : TraceMesh
+    seeds : (vertex, ports) each
+    max_steps : int
+        Bound on the triangles that one trace crosses.
+
+    Returns
+    -------
+    list of Trace
+        In the order of seeds and ports.
+
+    Raises
+    ------
+    LayoutError
+        If a trace does not end, or there is no way on.
+    """
+    return _Growth(mesh, max_steps).run(seeds)
+
+
+class _Growth:
+    """The state of `grow`."""
+
+    def __init__(self, mesh: TraceMesh, max_steps: int) -> None:
+        self.mesh = mesh
+        self.max_steps = max_steps
+        self.traces: list[Trace] = []
+        self.chords: list[list[Chord]] = [[] for _ in range(len(mesh.start) // 3)]
+        self.taken: set[int] = set()
+
+    def run(self, seeds: Sequence[tuple[int, Sequence[Port]]]) -> list[Trace]:
+        heap: list[tuple[float, int, int, int, int]] = []
+        for vertex, ports in seeds:
+            for number, port in enumerate(ports):
+                heap.append(self._start(vertex, number, port))
+        heap = [state for state in heap if state[2] >= 0]
+        heapq.heapify(heap)
+        while heap:
+            state = self._advance(*heap[0])
+            if state is None:
+                heapq.heappop(heap)
+            else:
+                heapq.heapreplace(heap, state)
+        return self.traces
+
+    def _start(self, vertex: int, number: int, port: Port) -> tuple[float, int, int, int, int]:
+        mesh, h = self.mesh, port.half_edge
+        t, k = divmod(h, 3)
+        corner = (k + 2) % 3
+        trace = Trace(vertex, number)
+        self.traces.append(trace)
+        place = int(port.fraction * ONE)
+        while not self._take(h, place):
+            place += NUDGE
+        chord = Chord(corner * ONE, k * ONE + place, port.branch, len(self.traces) - 1, 0, None)
+        return self._record(trace, t, chord, mesh.x[3 * t + corner], mesh.y[3 * t + corner], 0.0)
+
+    def _advance(self, length: float, i: int, h: int, place: int, branch: int) -> tuple[float, int, int, int, int] | None:
+        """Cross one triangle; returns the next state, or None at the end of the trace."""
+        mesh = self.mesh
+        trace = self.traces[i]
+        if len(trace.crossings) > self.max_steps:
+            raise LayoutError(
+                "a separatrix does not end",
+                location=mesh.point(h, place / ONE),
+                remedy="add a block corner or change the singularities",
+            )
+        t, k = divmod(h, 3)
+        a = k * ONE + place
+        out, s = ideal_exit(mesh, h, place / ONE, branch)
+        wall = mesh.wall[out]
+        if wall >= 0 and (branch - wall) % 4 != 3:
+            out, s = self._slide(h, out, s, (branch - wall) % 4)
+        b = (out - 3 * t) * ONE + int(s * ONE)
+        chords = self.chords[t]
+        for _ in range(TRIES):
+            host, blocked = self._meet(chords, a, b, branch)
+            if blocked:
+                b = self._beside(t, chords, a, b, branch)
+            elif self._take(3 * t + b // ONE, b % ONE):
+                break
+            else:
+                b += NUDGE if b % ONE < ONE // 2 else -NUDGE
+        else:
+            raise self._stuck(t)
+        chord = Chord(a, b, branch, i, len(trace.crossings), host)
+        x, y = mesh.x[h] + place / ONE * mesh.ex[h], mesh.y[h] + place / ONE * mesh.ey[h]
+        state = self._record(trace, t, chord, x, y, length)
+        return state if state[2] >= 0 else None
+
+    def _record(self, trace: Trace, t: int, chord: Chord, x: float, y: float, length: float) -> tuple[float, int, int, int, int]:
+        """Add a chord that starts at (x, y) to its trace; returns the next state, its half-edge -1 at the end of the trace."""
+        mesh = self.mesh
+        k, place = divmod(chord.b, ONE)
+        q = 3 * t + k
+        dx, dy = mesh.x[q] + place / ONE * mesh.ex[q] - x, mesh.y[q] + place / ONE * mesh.ey[q] - y
+        self.chords[t].append(chord)
+        trace.last = chord
+        trace.crossings.append((q, place))
+        if chord.host is not None:
+            trace.host = chord.host
+            trace.across, trace.along = self._intersect(t, x, y, dx, dy, chord.host)
+            return length, chord.trace, -1, 0, 0
+        g = mesh.twin[q]
+        if g < 0:
+            return length, chord.trace, -1, 0, 0
+        return length + hypot(dx, dy), chord.trace, g, ONE - place, (chord.branch + mesh.shift[q]) % 4
+
+    def _slide(self, entry: int, wall: int, s: float, turn: int) -> tuple[int, float]:
+        """Exit that passes a boundary edge at its end, for a branch that does not leave there."""
+        n, p = next_of(wall), previous_of(wall)
+        onward = turn == 0 or (turn == 1 and s >= 0.5)
+        if (onward and n != entry) or p == entry:
+            return n, SLIDE
+        return p, 1.0 - SLIDE
+
+    def _meet(self, chords: list[Chord], a: int, b: int, branch: int) -> tuple[Chord | None, bool]:
+        """First chord that a new one from `a` to `b` stops at, and whether one is in the way that must not be crossed."""
+        xb = (b - a) % AROUND
+        first, nearest = None, AROUND
+        for chord in chords:
+            p, q, other, _, _, host = chord
+            xp, xq = (p - a) % AROUND, (q - a) % AROUND
+            if (xp < xb) == (xq < xb) or (host is not None and on_left(host, a) != on_left(host, p)):
+                continue
+            turn = (other - branch) % 4
+            if not ((turn == 1 and xp < xq) or (turn == 3 and xp > xq)):
+                return None, True
+            if min(xp, xq) < nearest:
+                first, nearest = chord, min(xp, xq)
+        return first, False
+
+    def _beside(self, t: int, chords: list[Chord], a: int, b: int, branch: int) -> int:
+        """The allowed exit nearest to `b`.
+
+        Places are measured counter-clockwise from `a`; every chord that must not be crossed forbids the part of the rim behind it.
+        """
+        mesh = self.mesh
+        k = a // ONE
+        corner = (k + 1) * ONE - a
+        forbidden = [(0, corner), (corner + ONE, corner + ONE), (corner + 2 * ONE, AROUND)]
+        for m in (1, 2):
+            wall = mesh.wall[3 * t + (k + m) % 3]
+            if wall >= 0 and (branch - wall) % 4 != 3:
+                forbidden.append((corner + (m - 1) * ONE, corner + m * ONE))
+        for p, q, other, _, _, host in chords:
+            if host is not None and on_left(host, a) != on_left(host, p):
+                continue
+            xp, xq = (p - a) % AROUND, (q - a) % AROUND
+            turn = (other - branch) % 4
+            if not ((turn == 1 and xp < xq) or (turn == 3 and xp > xq)):
+                forbidden.append((min(xp, xq), max(xp, xq)))
+        forbidden.sort()
+        wanted = (b - a) % AROUND
+        best, distance, reach = -1, AROUND, 0
+        for low, high in forbidden:
+            room = low - reach
+            if room > 3:
+                margin = min(room // 2, BESIDE)
+                x = min(max(wanted, reach + margin), low - margin)
+                if abs(x - wanted) < distance:
+                    best, distance = x, abs(x - wanted)
+            reach = max(reach, high)
+        if best < 0:
+            raise self._stuck(t)
+        return (a + best) % AROUND
+
+    def _take(self, h: int, place: int) -> bool:
+        """Take a place on an edge; False if somebody has it."""
+        g = self.mesh.twin[h]
+        key = (h * 2 * ONE + place) if g < 0 or h < g else (g * 2 * ONE + ONE - place)
+        if key in self.taken:
+            return False
+        self.taken.add(key)
+        return True
+
+    def _intersect(self, t: int, x: float, y: float, dx: float, dy: float, host: Chord) -> tuple[float, float]:
+        """Fractions of a chord from (x, y) along (dx, dy) and of its host where they cross."""
+        mesh = self.mesh
+        (ka, sa), (kb, sb) = divmod(host.a, ONE), divmod(host.b, ONE)
+        a, b = 3 * t + ka, 3 * t + kb
+        px, py = mesh.x[a] + sa / ONE * mesh.ex[a], mesh.y[a] + sa / ONE * mesh.ey[a]
+        fx, fy = mesh.x[b] + sb / ONE * mesh.ex[b] - px, mesh.y[b] + sb / ONE * mesh.ey[b] - py
+        cross = dx * fy - dy * fx
+        if cross == 0.0:
+            return 0.5, 0.5
+        across = ((px - x) * fy - (py - y) * fx) / cross
+        along = ((px - x) * dy - (py - y) * dx) / cross
+        return min(max(across, 0.0), 1.0), min(max(along, 0.0), 1.0)
+
+    def _stuck(self, t: int) -> LayoutError:
+        centre = [sum(c) / 3.0 for c in zip(*(self.mesh.points[v] for v in self.mesh.start[3 * t : 3 * t + 3]))]
+        return LayoutError("a separatrix has no way on", location=centre, remedy="a finer background mesh may help")
