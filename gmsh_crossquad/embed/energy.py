@@ -58,6 +58,14 @@ def _chi(area: Float, eps: float) -> tuple[Float, Float]:
     return chi, chi / root
 
 
+def _power(h: Float, power: int) -> Float:
+    """h ** power by products, which is many times faster for small powers."""
+    out = np.ones_like(h)
+    for _ in range(power):
+        out = out * h
+    return out
+
+
 def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tuple[float, Float, Float]:
     """Energy of all corners and its gradient.
 
@@ -90,7 +98,7 @@ def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tu
     inverse = 1.0 / chi
     h = 0.5 * square * inverse
     w = 0.5 * (1.0 + area * area) * inverse
-    h_power = h ** (power - 1)
+    h_power = _power(h, power - 1)
     energy = float((h_power * h).sum() + AREA_WEIGHT * w.sum())
     by_square = power * h_power * inverse  # 2 phi_N
     by_area = AREA_WEIGHT * area * inverse - slope * inverse * (power * h_power * h + AREA_WEIGHT * w)
@@ -123,8 +131,8 @@ def corner_hessian(x: Float, y: Float, rest: Float, eps: float, power: int) -> F
     h = 0.5 * square / chi
     w = 0.5 * (1.0 + area * area) / chi
     tilt = slope / chi
-    first = power * h ** (power - 1)
-    second = power * (power - 1) * h ** (power - 2) if power > 1 else np.zeros_like(h)
+    second = power * (power - 1) * _power(h, power - 2) if power > 1 else np.zeros_like(h)
+    first = power * _power(h, power - 1)
     h_n, h_d = 0.5 / chi, -h * tilt
     n1 = 2.0 * first * h_n
     nn = 4.0 * second * h_n * h_n

@@ -3,7 +3,8 @@
 The T-mesh gives every quad the lengths of its sides, constant per patch, with jumps between patches.  Here an edge gets
 one length l, in three steps on u = log l:
 
-1. the mean over the quads at the edge; an edge between two fixed vertices of a curve keeps its true length;
+1. the mean over the quads at the edge, or once the grid is untangled the mean of that and the log of the edge's actual
+   length, since the T-mesh does not know how wide a patch will become; an edge between two fixed vertices of a curve keeps its true length;
 2. diffusion between neighbours, anchored at step 1:  u <- (ANCHOR u0 + sum u_n) / (ANCHOR + number), where the
    neighbours are the opposite edges in the quads (across) and the continuing edges at the vertices (along);
 3. where two neighbours still differ by more than `LEAST_RATIO`, both move half of the excess.
@@ -52,13 +53,16 @@ class RestLengths:
     vertices: Float
 
 
-def rest_lengths(guide: Guide, model: Model) -> RestLengths:
+def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLengths:
     """Make the sizes of a guide grid consistent.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    actual : bool
+        Take the geometric mean of `quad_size` and the present lengths of the edges instead of `quad_size` alone; the guide
+        must have no edge without length.
 
     Returns
     -------
@@ -68,6 +72,9 @@ def rest_lengths(guide: Guide, model: Model) -> RestLengths:
     count = np.bincount(quad_edges.ravel(), minlength=len(edges))
     sides = np.log(guide.quad_size[:, [0, 1, 0, 1]])
     own = np.bincount(quad_edges.ravel(), sides.ravel(), minlength=len(edges)) / count
+    if actual:
+        vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
+        own = 0.5 * (own + 0.5 * np.log(np.einsum("ec,ec->e", vector, vector)))
     chain_edges = _chain_edges(guide, edges)
     held = np.zeros(len(edges), dtype=bool)
     for row, rows in enumerate(chain_edges):

@@ -35,6 +35,8 @@ __all__ = ["SmoothReport", "smooth"]
 
 ROUNDS = 12
 """Greatest number of untangling rounds per start."""
+POLISHING = (4, 8)
+"""Factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
 LEAST_AREA = 1e-3
 GOOD = 0.7
 
@@ -92,10 +94,12 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
             best, quality, chosen = candidate, score, name
         if valid:
             break
-    polished = _polish(best, model, rest, barrier=quality > 0.0)
-    score = float(guide_quality(polished, model).min())
-    if min(score, GOOD) >= min(quality, GOOD):
-        best = polished
+    for effort in POLISHING:
+        valid = quality > 0.0
+        polished = _polish(best, model, rest_lengths(best, model, actual=True) if valid else rest, effort, barrier=valid)
+        score = float(guide_quality(polished, model).min())
+        if min(score, GOOD) >= min(quality, GOOD):
+            best, quality = polished, score
     final = guide_quality(best, model)
     return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen)
 
@@ -129,7 +133,7 @@ def _untangle(guide: Guide, model: Model, rest: RestLengths) -> tuple[Guide, int
     return _moved(guide, grid, z), rounds, least > 0.0
 
 
-def _polish(guide: Guide, model: Model, rest: RestLengths, barrier: bool) -> Guide:
+def _polish(guide: Guide, model: Model, rest: RestLengths, effort: int, barrier: bool) -> Guide:
     """Minimise the energy with the graded rest lengths; inside the barrier if there is none turned over."""
     grid = GridEnergy(guide, model, rest)
     if not grid.size:
@@ -139,6 +143,6 @@ def _polish(guide: Guide, model: Model, rest: RestLengths, barrier: bool) -> Gui
         partial(grid.value, sides=rest.sides, eps=eps, power=power),
         partial(grid.factor, sides=rest.sides, eps=eps, power=power),
         np.zeros(grid.size),
-        factorisations=8,
+        factorisations=effort,
     )
     return _moved(guide, grid, result.z)
