@@ -105,9 +105,9 @@ def _tangents(chord: Float, step: Float, closed: bool) -> tuple[Float, Float, Bo
     before, after = chord[:-1], chord[1:]
     h0, h1 = step[:-1, None], step[1:, None]
     inner = (h1 * before + h0 * after) / (h0 + h1)
-    first, last = 1.5 * chord[0] - 0.5 * inner[0] if len(inner) else chord[0], chord[-1]
+    first, last = 2.0 * chord[0] - inner[0] if len(inner) else chord[0], chord[-1]
     if len(inner):
-        last = 1.5 * chord[-1] - 0.5 * inner[-1]
+        last = 2.0 * chord[-1] - inner[-1]
         if closed:
             first = last = (step[0] * chord[-1] + step[-1] * chord[0]) / (step[0] + step[-1])
     node = np.vstack([first, inner, last])
