@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import models
 import numpy as np
 
 from gmsh_crossquad.records import Curve, Float, Guide, Int, Model
+
+from . import models
 
 
 def make_guide(

@@ -7,8 +7,9 @@ non-uniform grid
     t = (l2 / (l1 + l2)) d1 / l1 + (l1 / (l1 + l2)) d2 / l2
 
 and both sides share one speed per fine step, the harmonic mean 2 h1 h2 / (h1 + h2) with h = l / k, so that neither the
-direction nor the size of the fine edges jumps.  Where a line ends the edge is a parabola, 1.5 d - 0.5 t.  A speed below
-twice the chord keeps the cubic free of loops (Fritsch and Carlson 1980 allow up to three times).
+direction nor the size of the fine edges jumps.  Where a line ends the cubic has no curvature there (a natural spline):
+1.5 d - 0.5 t.  Speeds stay below twice the chord, which keeps the cubics free of loops (monotone up to three times the
+chord: F. N. Fritsch, R. E. Carlson, Monotone piecewise cubic interpolation, SIAM J. Numer. Anal. 17, 1980).
 """
 
 from __future__ import annotations
