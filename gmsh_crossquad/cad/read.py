@@ -20,7 +20,7 @@ from .plane import face_plane
 from .sample import refine, sample
 from .session import gmsh_errors
 from .tangents import cad_tangents
-from .transfinite import transfinite_spacing
+from .transfinite import transfinite_parameters
 
 __all__ = ["read_model"]
 
@@ -101,7 +101,11 @@ def read_model(options: MeshOptions) -> Model:
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
     kept = [r for r in raw if not _degenerate(r, scale)]
-    spacing = transfinite_spacing([r.tag for r in kept])
+    spacing = transfinite_parameters(
+        {r.tag: float(np.sqrt((np.diff(r.points, axis=0) ** 2).sum(1)).sum()) for r in kept},
+        [r.tag for r in kept if r.ends[0] == r.ends[1]],
+        {r.tag: r.kind for r in kept},
+    )
     curves = tuple(_curve(r, origin, scale, spacing.get(r.tag)) for r in kept)
     row = {c.tag: i for i, c in enumerate(curves)}
     place = np.array(vertices.points).reshape(-1, 3)

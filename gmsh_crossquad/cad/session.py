@@ -170,7 +170,8 @@ class MeshSnapshot:
         """The mesh of the current model."""
         records = []
         with gmsh_errors("reading the mesh of the model"):
-            for dim, tag in gmsh.model.getEntities():
+            meshed = len(gmsh.model.mesh.getNodes()[0]) > 0
+            for dim, tag in gmsh.model.getEntities() if meshed else []:
                 nodes, coordinates, _ = gmsh.model.mesh.getNodes(dim, tag)
                 types, elements, element_nodes = gmsh.model.mesh.getElements(dim, tag)
                 if not len(nodes) and not len(types):
