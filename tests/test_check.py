@@ -1,0 +1,136 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gmsh_crossquad.cad.files import MeshArrays
+from gmsh_crossquad.check import check_mesh, compare, format_report
+from tests.models import two_squares
+from tests.results import two_squares_mesh
+
+GROUPS = {(1, "left"): (6,), (2, "right square"): (2,)}
+
+
+def arrays(**changes):
+    """The hand-made mesh of two squares as if read from a file."""
+    mesh = two_squares_mesh()
+    lines = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes])
+    owner = np.repeat(np.arange(len(mesh.curve_nodes)) + 1, [len(c) - 1 for c in mesh.curve_nodes])
+    good = MeshArrays(
+        points=mesh.points,
+        quads=mesh.quads,
+        triangles=np.zeros((0, 3), np.int64),
+        lines=lines,
+        quad_entity=mesh.quad_face + 1,
+        triangle_entity=np.zeros(0, np.int64),
+        line_entity=owner,
+        groups=GROUPS,
+        physical={},
+    )
+    return replace(good, **changes)
+
+
+def judged(mesh, groups=GROUPS):
+    return compare(check_mesh(mesh), mesh, two_squares(), groups)
+
+
+def test_a_good_mesh_has_no_faults():
+    report = judged(arrays())
+    assert report.faults == ()
+    assert (report.quads, report.triangles, report.irregular, report.hanging, report.inverted) == (24, 0, 0, 0, 0)
+    assert report.min_scaled_jacobian == pytest.approx(1.0)
+    assert report.groups == ("left", "right square")
+    assert format_report(report, "x.msh").splitlines()[-1] == "ok"
+
+
+def split_quad(mesh, quad):
+    a, b, c, d = mesh.quads[quad]
+    return replace(
+        mesh,
+        quads=np.delete(mesh.quads, quad, axis=0),
+        quad_entity=np.delete(mesh.quad_entity, quad),
+        triangles=np.array([[a, b, c], [a, c, d]]),
+        triangle_entity=np.full(2, mesh.quad_entity[quad]),
+    )
+
+
+def test_triangles_are_a_fault():
+    report = judged(split_quad(arrays(), 0))
+    assert report.faults == ("2 triangles",)
+    assert report.hanging == 0
+
+
+def test_equilateral_triangle_is_perfect():
+    points = np.array([(0, 0, 0), (1, 0, 0), (0.5, np.sqrt(0.75), 0)])
+    none = np.zeros((0, 4), np.int64)
+    mesh = arrays(points=points, quads=none, quad_entity=none[:, 0], lines=none[:, :2], line_entity=none[:, 0])
+    mesh = replace(mesh, triangles=np.array([[0, 1, 2]]), triangle_entity=np.array([1]))
+    assert check_mesh(mesh).min_scaled_jacobian == pytest.approx(1.0)
+
+
+def test_a_folded_quad_is_a_fault():
+    points = arrays().points.copy()
+    points[two_squares_mesh().face_nodes[0][0]] += (0.5, 0.0, 0.0)
+    report = judged(arrays(points=points))
+    assert report.inverted >= 1
+    assert any("inverted" in f for f in report.faults)
+
+
+def test_a_crack_of_duplicate_nodes_is_a_fault():
+    mesh = arrays()
+    node = two_squares_mesh().face_nodes[0]
+    copy = {int(v): len(mesh.points) + k for k, v in enumerate(node)}
+    quads = mesh.quads.copy()
+    row = [k for k in range(len(quads)) if mesh.points[quads[k], 1].mean() > 0.5]
+    quads[row] = np.vectorize(lambda v: copy.get(int(v), int(v)))(quads[row])
+    report = check_mesh(replace(mesh, quads=quads, points=np.vstack([mesh.points, mesh.points[node]])))
+    assert report.hanging > 0
+    assert any("not conforming" in f for f in report.faults)
+
+
+def test_a_hanging_node_is_a_fault():
+    # one square of side 1 beside two of side 1/2
+    xy = [(0, 0), (1, 0), (1, 1), (0, 1), (1, 0.5), (1.5, 0), (1.5, 0.5), (1.5, 1)]
+    points = np.c_[np.array(xy), np.zeros(8)]
+    quads = np.array([[0, 1, 2, 3], [1, 5, 6, 4], [4, 6, 7, 2]])
+    report = check_mesh(
+        arrays(points=points, quads=quads, quad_entity=np.ones(3, np.int64), lines=np.zeros((0, 2), np.int64), groups={})
+    )
+    assert report.hanging == 1
+
+
+def test_a_turned_quad_is_a_fault():
+    quads = arrays().quads.copy()
+    quads[0] = quads[0][::-1]
+    report = check_mesh(arrays(quads=quads))
+    assert any("oriented differently" in f for f in report.faults)
+
+
+def test_a_missing_quad_leaves_the_boundary_loose():
+    mesh = arrays()
+    inner = np.flatnonzero(np.isclose(mesh.points[mesh.quads].mean(axis=1)[:, 0], 0.5))[1]
+    holed = replace(mesh, quads=np.delete(mesh.quads, inner, axis=0), quad_entity=np.delete(mesh.quad_entity, inner))
+    report = judged(holed)
+    assert any("not on the boundary of the model" in f for f in report.faults)
+    assert any("the area is" in f for f in report.faults)
+
+
+def test_a_missed_cad_vertex_is_a_fault():
+    points = arrays().points.copy()
+    corner = two_squares_mesh().vertex_node[0]
+    points[corner] += (0.02, 0.0, 0.0)
+    assert any("1 CAD vertices are no nodes" in f for f in judged(arrays(points=points)).faults)
+
+
+@pytest.mark.parametrize("lost, what", [((1, "left"), "curve 'left'"), ((2, "right square"), "surface 'right square'")])
+def test_a_lost_group_is_a_fault(lost, what):
+    kept = {k: v for k, v in GROUPS.items() if k != lost}
+    report = judged(arrays(groups=kept))
+    assert [f for f in report.faults if what in f and "not carried in full" in f]
+
+
+def test_no_quads_is_a_fault():
+    none = np.zeros((0, 4), np.int64)
+    report = judged(arrays(quads=none, quad_entity=none[:, 0]))
+    assert "no quads" in report.faults
+    assert np.isnan(report.min_scaled_jacobian)

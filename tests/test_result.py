@@ -1,0 +1,120 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gmsh_crossquad.errors import MeshError
+from gmsh_crossquad.quality import measure_quality, twins
+from gmsh_crossquad.result import build_layout
+from tests.results import NX, NY, hand_made, two_squares_mesh
+
+UP = np.array([[0.0, 0.0, 1.0]] * 2)
+
+
+def test_layout_of_a_grid():
+    result = hand_made()
+    layout = result.layout
+    assert [b.face for b in layout.blocks] == [1, 1, 2, 2]
+    assert {tuple(sorted(b.divisions)) for b in layout.blocks} == {tuple(sorted((NX, NY)))}
+    # a grid of 2 x 2 blocks has 12 edges: 4 cut the squares in half or lie on the shared side
+    assert len(layout.edges) == 12
+    assert sum(e.curve is None for e in layout.edges) == 2
+    assert sum(e.curve == 7 for e in layout.edges) == 2
+    uses = np.bincount([e for b in layout.blocks for e, _ in b.sides], minlength=12)
+    assert sorted(uses) == [1] * 8 + [2] * 4
+
+
+def test_sides_of_a_block_form_a_counter_clockwise_loop():
+    layout = hand_made().layout
+    for block in layout.blocks:
+        runs = [layout.edges[e].points[::sign] for e, sign in block.sides]
+        for a, b in zip(runs, runs[1:] + runs[:1], strict=True):
+            np.testing.assert_array_equal(a[-1], b[0])
+        ring = np.concatenate([r[:-1] for r in runs])
+        following = np.roll(ring, -1, axis=0)
+        area = 0.5 * np.sum(ring[:, 0] * following[:, 1] - following[:, 0] * ring[:, 1])
+        assert area == pytest.approx(0.5)
+        assert tuple(layout.edges[e].divisions for e, _ in block.sides) == block.divisions * 2
+
+
+def test_layout_does_not_depend_on_where_quads_start():
+    mesh = two_squares_mesh()
+    turned = np.array([np.roll(q, k % 4) for k, q in enumerate(mesh.quads)])
+    layout = build_layout(replace(mesh, quads=turned), hand_made().stages.model)
+    assert len(layout.edges) == 12
+    assert {frozenset(e.nodes.tolist()) for e in layout.edges} == {frozenset(e.nodes.tolist()) for e in hand_made().layout.edges}
+
+
+def test_block_that_is_no_grid_is_refused():
+    mesh = two_squares_mesh()
+    block = mesh.quad_block.copy()
+    block[0] = 1  # block 0 loses a corner quad: five corners
+    with pytest.raises(MeshError, match="not a grid"):
+        build_layout(replace(mesh, quad_block=block), hand_made().stages.model)
+
+
+def test_quality_of_squares_and_parallelograms():
+    mesh = two_squares_mesh()
+    quality = measure_quality(mesh, UP)
+    assert (quality.quads, quality.blocks, quality.irregular, quality.inverted) == (4 * NX * NY, 4, 0, 0)
+    assert quality.conforming
+    assert quality.min_scaled_jacobian == pytest.approx(1.0)
+    sheared = mesh.points.copy()
+    sheared[:, 0] += sheared[:, 1] / np.tan(np.radians(50))
+    quality = measure_quality(replace(mesh, points=sheared), UP)
+    assert quality.min_scaled_jacobian == pytest.approx(np.sin(np.radians(50)))
+    assert quality.mean_scaled_jacobian == pytest.approx(np.sin(np.radians(50)))
+
+
+def test_quality_sees_a_fold_and_a_slit():
+    mesh = two_squares_mesh()
+    folded = mesh.points.copy()
+    folded[mesh.face_nodes[0][0]] += (5.0, 0.0, 0.0)
+    assert measure_quality(replace(mesh, points=folded), UP).inverted > 0
+    slit = mesh.quads.copy()
+    inner = mesh.face_nodes[0][0]
+    first = np.flatnonzero((slit == inner).any(axis=1))[0]
+    slit[first][slit[first] == inner] = len(mesh.points)
+    cut = replace(mesh, quads=slit, points=np.vstack([mesh.points, mesh.points[inner]]))
+    assert not measure_quality(cut, UP).conforming
+
+
+def test_irregular_vertices_are_counted_inside_only():
+    # three quads around a vertex: the hexagon
+    angle = np.arange(6) * np.pi / 3
+    points = np.vstack([np.c_[np.cos(angle), np.sin(angle), np.zeros(6)], np.zeros(3)])
+    quads = np.array([[6, 0, 1, 2], [6, 2, 3, 4], [6, 4, 5, 0]])
+    mesh = replace(
+        two_squares_mesh(),
+        points=points,
+        quads=quads,
+        quad_face=np.zeros(3, np.int64),
+        quad_block=np.arange(3),
+        vertex_node=np.array([0]),
+        curve_nodes=(np.array([0, 1, 2, 3, 4, 5, 0]),),
+    )
+    quality = measure_quality(mesh, UP)
+    assert quality.irregular == 1
+    assert quality.conforming
+    assert quality.min_scaled_jacobian == pytest.approx(np.sin(np.pi / 3))
+
+
+def test_twins():
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    twin = twins(quads)
+    assert twin[1] == 7 and twin[7] == 1
+    assert (np.delete(twin, [1, 7]) == -1).all()
+    three = twins(np.array([[0, 1, 4, 3], [1, 2, 5, 4], [1, 6, 7, 4]]))
+    assert three[1] == -2
+
+
+def test_singularities_and_field_are_in_user_coordinates():
+    result = hand_made()
+    assert len(result.singularities) == 1
+    spot = result.singularities[0]
+    np.testing.assert_allclose(spot.point, [0.5, 0.5, 0.0], atol=1e-12)
+    assert (spot.index, spot.valence, spot.face) == (1, 3, 1)
+    for field in result.field:
+        np.testing.assert_allclose(np.abs(field.directions), np.tile([1.0, 0.0, 0.0], (8, 1)), atol=1e-12)
+        low, high = field.places.min(axis=0), field.places.max(axis=0)
+        np.testing.assert_allclose(high - low, [1.0, 1.0, 0.0], atol=1e-12)
