@@ -21,10 +21,10 @@ from .start import chain_arclengths
 __all__ = ["ChainEnergy"]
 
 GAP_WEIGHT = 0.5
-TURN_WEIGHT = 20.0
+TURN_WEIGHT = 2000.0
 TURN_LIMIT = float(np.radians(50.0))
 """Angle from which the turning costs; with the weight it stays below 60 degrees where the number of edges allows it."""
-GRADE_WEIGHT = 4.0
+GRADE_WEIGHT = 50.0
 GRADE_LIMIT = float(np.log(2.0))
 
 

@@ -41,7 +41,7 @@ def minimise(
     *,
     factorisations: int,
     steps: int = 8,
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-5,
     done: Callable[[Float], bool] | None = None,
 ) -> Minimum:
     """Minimise a function.

@@ -3,8 +3,9 @@
 The T-mesh gives every quad the lengths of its sides, constant per patch, with jumps between patches.  Here an edge gets
 one length l, in three steps on u = log l:
 
-1. the mean over the quads at the edge, or once the grid is untangled the mean of that and the log of the edge's actual
-   length, since the T-mesh does not know how wide a patch will become; an edge between two fixed vertices of a curve keeps its true length;
+1. the mean over the quads at the edge; once the grid is untangled, the mean of that and the log of the actual length,
+   since the layout does not know how wide a patch will become; an edge between two fixed vertices of a curve keeps its
+   true length; where a curve turns along an edge by T > `TURN`, the edge is shortened by T / TURN;
 2. diffusion between neighbours, anchored at step 1:  u <- (ANCHOR u0 + sum u_n) / (ANCHOR + number), where the
    neighbours are the opposite edges in the quads (across) and the continuing edges at the vertices (along);
 3. where two neighbours still differ by more than `LEAST_RATIO`, both move half of the excess.
@@ -20,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..records import Bool, Float, Guide, Int, Model
+from .curve_table import CurveTable
 from .start import chain_arclengths, grid_edges
 
 __all__ = ["RestLengths", "rest_lengths"]
@@ -27,6 +29,8 @@ __all__ = ["RestLengths", "rest_lengths"]
 ANCHOR = 1.0
 SWEEPS = 12
 """Jacobi sweeps of the diffusion, and of the limiter."""
+TURN = float(np.radians(40.0))
+"""Wanted greatest turning of a curve along one edge."""
 LEAST_RATIO = 2.0
 """Rest lengths of neighbours differ by no more than this factor, where they are free."""
 
@@ -77,13 +81,18 @@ def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLen
         own = 0.5 * (own + 0.5 * np.log(np.einsum("ec,ec->e", vector, vector)))
     chain_edges = _chain_edges(guide, edges)
     held = np.zeros(len(edges), dtype=bool)
+    table = CurveTable(model.curves)
     for row, rows in enumerate(chain_edges):
         fixed = guide.fixed[guide.chains[row]].copy()
         if len(fixed):
             fixed[[0, -1]] = True
         single = fixed[:-1] & fixed[1:]
         held[rows[single]] = True
-        own[rows[single]] = np.log(np.diff(chain_arclengths(guide, model, row))[single]) if single.any() else 0.0
+        if len(rows):
+            places = chain_arclengths(guide, model, row)
+            own[rows[single]] = np.log(np.diff(places)[single])
+            turning = np.diff(table.at(np.full(len(places), row), places)[0][:, 3])
+            own[rows[~single]] -= np.log(np.maximum(turning[~single] / TURN, 1.0))
     pairs = _neighbours(guide, edges, quad_edges)
     length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held))
     chains = tuple(
