@@ -26,11 +26,12 @@ BLOCK = 1 << 20  # pairs handled at once
 
 
 class Contact(NamedTuple):
-    """A place where two polylines (or two parts of one) touch or cross."""
+    """A place where two polylines (or two parts of one) touch or cross; `segments` holds the row of each."""
 
     first: int
     second: int
     point: Float
+    segments: tuple[int, int]
 
 
 def contacts(polylines: Sequence[Float], ends: Sequence[tuple[int, int]]) -> list[Contact]:
@@ -51,16 +52,18 @@ def contacts(polylines: Sequence[Float], ends: Sequence[tuple[int, int]]) -> lis
     start, stop, curve, node = _segments(polylines, ends)
     i, j = _candidates(polylines, start, stop)
     adjacent = (node[i][:, :, None] == node[j][:, None, :]).any((1, 2))
-    found: dict[tuple[int, int], Float] = {}
+    offset = np.searchsorted(curve, np.arange(len(polylines)))
+    found: dict[tuple[int, int], Contact] = {}
     for touching in (True, False):
         rows = np.flatnonzero(adjacent == touching)
         for begin in range(0, len(rows), BLOCK):
             a, b = i[rows[begin : begin + BLOCK]], j[rows[begin : begin + BLOCK]]
             hit, where = _overlap(start, stop, node, a, b) if touching else _near(polylines, start, stop, curve, a, b)
             for k in np.flatnonzero(hit):
-                pair = (int(min(curve[a[k]], curve[b[k]])), int(max(curve[a[k]], curve[b[k]])))
-                found.setdefault(pair, where[k])
-    return [Contact(*pair, found[pair]) for pair in sorted(found)]
+                sides = sorted((int(curve[row]), int(row - offset[curve[row]])) for row in (a[k], b[k]))
+                (first, p), (second, q) = sides
+                found.setdefault((first, second), Contact(first, second, where[k], (p, q)))
+    return [found[pair] for pair in sorted(found)]
 
 
 def _segments(polylines: Sequence[Float], ends: Sequence[tuple[int, int]]) -> tuple[Float, Float, Int, Int]:

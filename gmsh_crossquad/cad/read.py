@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import GeometryError
 from ..options import MeshOptions
 from ..records import Curve, Face, Float, Model
+from .knots import untie
 from .loops import boundary_loops
 from .plane import face_plane
 from .sample import refine, sample
@@ -24,6 +25,7 @@ from .transfinite import transfinite_parameters
 
 __all__ = ["read_model"]
 
+CONVEX = ("Line", "Circle", "Ellipse")  # cannot meet themselves
 COINCIDENT = 1e-12  # of the model: shorter closed curves are degenerate
 
 
@@ -98,6 +100,8 @@ def read_model(options: MeshOptions) -> Model:
         raise GeometryError("the surface has no extent", entity=(2, tags[0]), remedy="remove it")
     for r in raw:
         r.parameters, r.points = refine(r.tag, r.kind, r.parameters, r.points, scale)
+        if r.kind not in CONVEX and not _degenerate(r, scale):
+            r.parameters, r.points = untie(r.parameters, r.points, scale)
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
     kept = [r for r in raw if not _degenerate(r, scale)]

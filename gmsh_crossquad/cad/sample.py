@@ -12,7 +12,7 @@ import gmsh
 import numpy as np
 
 from ..errors import GeometryError
-from ..records import Bool, Float, Int
+from ..records import Float, Int
 from .session import gmsh_errors
 
 __all__ = ["evaluate", "refine", "sample"]
@@ -90,17 +90,14 @@ def _order_segments(lines: Int, tag: int) -> list[int]:
     return chain
 
 
-def _coarse(a: Float, m: Float, b: Float, scale: float) -> Bool:
-    """Segments (a, b) with middle points m that are not fine enough when m is added."""
+def _error(a: Float, m: Float, b: Float) -> tuple[Float, Float, Float]:
+    """Deviation and turning of segments (a, b) with middle points m, and the greater distance of m from the ends."""
     chord, first, second = b - a, m - a, b - m
-    size = np.sqrt((chord**2).sum(1))
-    one, two = np.sqrt((first**2).sum(1)), np.sqrt((second**2).sum(1))
+    size, one, two = (np.sqrt((v**2).sum(1)) for v in (chord, first, second))
     along = (first * second).sum(1)
     normal = np.sqrt(np.maximum((one * two) ** 2 - along**2, 0.0))
     deviation = np.divide(normal, size, out=np.maximum(one, two), where=size > 0)
-    turning = np.arctan2(normal, along)
-    longer = np.maximum(one, two) > SHORTEST * scale
-    return ((deviation > 4 * DEVIATION * scale) | (turning > TURNING)) & longer
+    return deviation, np.arctan2(normal, along), np.maximum(one, two)
 
 
 def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) -> tuple[Float, Float]:
@@ -121,6 +118,8 @@ def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) 
     """
     if kind == "Line" or kind.startswith("Discrete"):
         return parameters, points
+    if kind == "Circle":
+        return _uniform(tag, parameters, points, scale)
     check = np.ones(len(parameters) - 1, bool)
     for _ in range(24):
         rows = np.flatnonzero(check)
@@ -128,10 +127,20 @@ def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) 
             break
         middle = 0.5 * (parameters[rows] + parameters[rows + 1])
         new = evaluate(tag, middle)
-        bad = _coarse(points[rows], new, points[rows + 1], scale)
+        deviation, turning, reach = _error(points[rows], new, points[rows + 1])
+        bad = ((deviation > 4 * DEVIATION * scale) | (turning > TURNING)) & (reach > SHORTEST * scale)
         parameters = np.insert(parameters, rows + 1, middle)
         points = np.insert(points, rows + 1, new, axis=0)
         check = np.zeros(len(parameters) - 1, bool)
         at = rows[bad] + np.flatnonzero(bad)  # the first half of a segment that was split after `at` earlier ones
         check[at] = check[at + 1] = True
     return parameters, points
+
+
+def _uniform(tag: int, parameters: Float, points: Float, scale: float) -> tuple[Float, Float]:
+    """The same for a circle, whose segments are all alike: deviation falls with the square of their number."""
+    deviation, turning, _ = _error(points[:1], points[1:2], points[2:3])
+    finer = max(np.sqrt(0.25 * deviation[0] / (DEVIATION * scale)), turning[0] / TURNING, 1.0)
+    count = min((len(parameters) - 1) * int(np.ceil(finer)), MAX_SAMPLES - 1)
+    parameters = np.linspace(parameters[0], parameters[-1], count + 1)
+    return parameters, np.concatenate([points[:1], evaluate(tag, parameters[1:-1]), points[-1:]])
