@@ -18,7 +18,7 @@ from ..errors import LayoutError
 from ..field.surface_mesh import SurfaceMesh
 from ..records import AlignedField, Bool, FaceMesh, FaceTMesh, Float, Int
 from .patches import Half, Ring, patches
-from .ports import ports
+from .ports import fan
 from .trace import AROUND, ONE, Trace, grow, on_left
 from .trace_mesh import TraceMesh, trace_mesh
 
@@ -58,7 +58,7 @@ def trace_face(mesh: FaceMesh, aligned: AlignedField, extra_ports: Sequence[int]
         tracing = trace_mesh(mesh, surface, aligned, seed)
         at = _half_edges_at(tracing)
         seeds = np.flatnonzero(seed).tolist()
-        traces = grow(tracing, [(v, ports(tracing, at[v], int(aligned.index[v]))) for v in seeds], steps)
+        traces = grow(tracing, [(v, fan(tracing, at[v], int(aligned.index[v]))) for v in seeds], steps)
         touched = set(loop[seed].tolist())
         touched |= {int(loop[mesh.boundary[tracing.row[t.crossings[-1][0]], 0]]) for t in traces if t.host is None}
         missing = _missing_ports(mesh, surface, seed, touched)

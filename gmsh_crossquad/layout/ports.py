@@ -11,6 +11,7 @@ Which ray belongs to which branch of the cross follows from counting around the 
 
 from __future__ import annotations
 
+import itertools
 from math import atan2, ceil, hypot, pi, sin
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ from ..errors import LayoutError
 from .step import CLEAR
 from .trace_mesh import QUARTER, TraceMesh, next_of, previous_of
 
-__all__ = ["Port", "ports"]
+__all__ = ["Fan", "Port", "fan"]
 
 SLIDE = 0.02
 """Fraction of an edge next to a vertex where a direction along the boundary passes."""
@@ -32,8 +33,19 @@ class Port(NamedTuple):
     branch: int
 
 
-def ports(mesh: TraceMesh, h: int, index: int) -> list[Port]:
-    """Ports of a seed, counter-clockwise (at the boundary from the outgoing half-edge).
+class Fan(NamedTuple):
+    """The separatrices of a seed, counter-clockwise (at the boundary from the outgoing half-edge), and its gates.
+
+    A gate is a half-edge of a spoke and the set of branches (bits) that may leave its triangle there: the spoke lies between two
+    separatrices of branches b and b + 1, hence b and b + 3 cross it clockwise and the other two counter-clockwise.
+    """
+
+    ports: list[Port]
+    gates: list[tuple[int, int]]
+
+
+def fan(mesh: TraceMesh, h: int, index: int) -> Fan:
+    """Ports and gates of a seed.
 
     Parameters
     ----------
@@ -71,7 +83,8 @@ def ports(mesh: TraceMesh, h: int, index: int) -> list[Port]:
         g0 = _fit(mesh, star, polar, branch, offset, slope)
         low = ceil(-g0 / QUARTER)
         rays = [((g0 + j * QUARTER) / slope, j) for j in range(low, low + count)]
-    return _place(mesh, star, polar, branch, rays)
+    placed = _place(mesh, star, polar, branch, rays)
+    return Fan(_ports(mesh, star, branch, placed, count), _gates(mesh, star, branch, placed, count))
 
 
 def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], list[float]]:
@@ -80,7 +93,7 @@ def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], 
     Returns
     -------
     polar : angle of every spoke, and of the last one's end
-    branch : branch of the tracked direction of the cross in every triangle (0 in the first; along the first spoke at the boundary)
+    branch : branch of the tracked direction in every triangle (0 in the first; at the boundary along the first spoke)
     offset : tracked direction minus the spoke's angle at the middle of every spoke, and at the last
     """
     polar, branch, offset = [0.0], [max(mesh.wall[star[0]], 0)], []
@@ -115,36 +128,80 @@ def _fit(mesh: TraceMesh, star: list[int], polar: list[float], branch: list[int]
     return total / weight
 
 
-def _place(mesh: TraceMesh, star: list[int], polar: list[float], branch: list[int], rays: list[tuple[float, int]]) -> list[Port]:
-    """Turn rays into crossings of the star's rim, in the same order and apart from each other."""
+def _place(
+    mesh: TraceMesh, star: list[int], polar: list[float], branch: list[int], rays: list[tuple[float, int]]
+) -> list[tuple[int, float, int]]:
+    """Triangle of the star (counted on where the star closes), fraction of the rim edge, and number of every ray, in order."""
     n = len(star)
     closed = mesh.wall[star[0]] < 0
-    sectors: dict[int, list[tuple[int, int, float, int]]] = {}
+    out = []
     i = 0
     for angle, j in rays:
         while i + 1 < n and angle >= polar[i + 1]:
             i += 1
-        at, b = i, (branch[i] + j) % 4
+        at, b = i, branch[i] + j
         s = _rim_fraction(mesh, star[i], angle - polar[i], polar[i + 1] - polar[i])
-        for _ in range(n):  # a rim edge on the boundary is only left straight outwards: slide along it to the neighbour
-            wall = mesh.wall[next_of(star[at % n])]
-            turn = (b - wall) % 4
-            if wall < 0 or turn == 3:
+        for _ in range(n):
+            way = _aside(mesh, next_of(star[at % n]), b, s)
+            if way == 0:
                 break
-            onward = turn == 0 or (turn == 1 and s >= 0.5)
-            b += mesh.shift[previous_of(star[at % n]) if onward else star[at % n]]
-            at, s = (at + 1, SLIDE) if onward else (at - 1, 1.0 - SLIDE)
+            b += mesh.shift[previous_of(star[at % n]) if way > 0 else star[at % n]]
+            at, s = (at + 1, SLIDE) if way > 0 else (at - 1, 1.0 - SLIDE)
             if not (closed or 0 <= at < n):
                 raise LayoutError("no way out of a corner", location=mesh.points[mesh.start[star[0]]])
-        sectors.setdefault(at % n, []).append((-(at // n), j, s, b % 4))
-    out = []
+        else:
+            raise LayoutError("no way out of a singularity", location=mesh.points[mesh.start[star[0]]])
+        out.append((at, s, j))
+    return out
+
+
+def _aside(mesh: TraceMesh, rim: int, branch: int, s: float) -> int:
+    """0 if a branch may cross a rim edge, else +1 or -1: the way around the seed to an edge beside it.
+
+    A boundary edge is only left straight outwards.  An edge that ends at the boundary is not crossed against the direction in which
+    the branch passes that end; it has to pass on the other side of it.
+    """
+    if mesh.gate[rim] >> branch % 4 & 1:
+        return 0
+    if mesh.wall[rim] >= 0:
+        turn = (branch - mesh.wall[rim]) % 4
+        return 1 if turn == 0 or (turn == 1 and s >= 0.5) else -1
+    return -1 if mesh.on_boundary[mesh.start[rim]] else 1
+
+
+def _ports(mesh: TraceMesh, star: list[int], branch: list[int], placed: list[tuple[int, float, int]], count: int) -> list[Port]:
+    """Crossings of the rim, apart from each other where rays share a triangle."""
+    n = len(star)
+    sectors: dict[int, list[tuple[int, float]]] = {}
+    for at, s, j in placed:
+        sectors.setdefault(at % n, []).append((j - at // n * count, s))
+    found: list[tuple[int, Port]] = []
     for at, unsorted in sectors.items():
         group = sorted(unsorted)
-        fractions = [min(max(s, CLEAR), 1.0 - CLEAR) for _, _, s, _ in group]
-        if any(q - p < CLEAR for p, q in zip(fractions, fractions[1:])):
+        fractions = [min(max(s, CLEAR), 1.0 - CLEAR) for _, s in group]
+        if any(q - p < CLEAR for p, q in itertools.pairwise(fractions)):
             fractions = [(m + 1.0) / (len(group) + 1.0) for m in range(len(group))]
-        out += [(j, Port(next_of(star[at]), s, b)) for s, (_, j, _, b) in zip(fractions, group)]
-    return [port for _, port in sorted(out)]
+        found += [(j, Port(next_of(star[at]), s, (branch[at] + j) % 4)) for s, (j, _) in zip(fractions, group)]
+    first = placed[0][2] if placed else 0
+    return [port for _, port in sorted(found, key=lambda item: (item[0] - first) % count)]
+
+
+def _gates(
+    mesh: TraceMesh, star: list[int], branch: list[int], placed: list[tuple[int, float, int]], count: int
+) -> list[tuple[int, int]]:
+    """Gates of all spokes inside the face."""
+    n = len(star)
+    closed = mesh.wall[star[0]] < 0
+    if closed:
+        placed = [(at + w * n, s, j + w * count) for w in (-1, 0, 1) for at, s, j in placed]
+    out = []
+    for i in range(0 if closed else 1, n):
+        low = max((j for at, _, j in placed if at < i), default=0)
+        b = branch[i] + low
+        out.append((star[i], 1 << b % 4 | 1 << (b + 3) % 4))
+        b += mesh.shift[star[i]]
+        out.append((mesh.twin[star[i]], 1 << (b + 1) % 4 | 1 << (b + 2) % 4))
+    return out
 
 
 def _rim_fraction(mesh: TraceMesh, h: int, angle: float, corner: float) -> float:

@@ -26,7 +26,7 @@ from math import hypot
 from typing import NamedTuple
 
 from ..errors import LayoutError
-from .ports import SLIDE, Port
+from .ports import SLIDE, Fan, Port
 from .step import ideal_exit
 from .trace_mesh import TraceMesh, next_of, previous_of
 
@@ -101,13 +101,13 @@ def on_left(chord: Chord, place: int) -> bool:
     return (chord.a - place) % AROUND < (chord.b - place) % AROUND
 
 
-def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Sequence[Port]]], max_steps: int) -> list[Trace]:
+def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Fan]], max_steps: int) -> list[Trace]:
     """Grow all separatrices until each has met another one or the boundary.
 
     Parameters
     ----------
     mesh : TraceMesh
-    seeds : (vertex, ports) each
+    seeds : (vertex, ports and gates) each
     max_steps : int
         Bound on the triangles that one trace crosses.
 
@@ -134,10 +134,12 @@ class _Growth:
         self.chords: list[list[Chord]] = [[] for _ in range(len(mesh.start) // 3)]
         self.taken: set[int] = set()
 
-    def run(self, seeds: Sequence[tuple[int, Sequence[Port]]]) -> list[Trace]:
+    def run(self, seeds: Sequence[tuple[int, Fan]]) -> list[Trace]:
         heap: list[tuple[float, int, int, int, int]] = []
-        for vertex, ports in seeds:
-            for number, port in enumerate(ports):
+        for vertex, fan in seeds:
+            for h, branches in fan.gates:
+                self.mesh.gate[h] = branches
+            for number, port in enumerate(fan.ports):
                 heap.append(self._start(vertex, number, port))
         heap = [state for state in heap if state[2] >= 0]
         heapq.heapify(heap)
@@ -174,14 +176,13 @@ class _Growth:
         t, k = divmod(h, 3)
         a = k * ONE + place
         out, s = ideal_exit(mesh, h, place / ONE, branch)
-        wall = mesh.wall[out]
-        if wall >= 0 and (branch - wall) % 4 != 3:
-            out, s = self._slide(h, out, s, (branch - wall) % 4)
+        if mesh.wall[out] >= 0 and not mesh.gate[out] >> branch & 1:
+            out, s = self._slide(h, out, s, (branch - mesh.wall[out]) % 4)
         b = (out - 3 * t) * ONE + int(s * ONE)
         chords = self.chords[t]
         for _ in range(TRIES):
             host, blocked = self._meet(chords, a, b, branch)
-            if blocked:
+            if blocked or not mesh.gate[3 * t + b // ONE] >> branch & 1:
                 b = self._beside(t, chords, a, b, branch)
             elif self._take(3 * t + b // ONE, b % ONE):
                 break
@@ -246,8 +247,7 @@ class _Growth:
         corner = (k + 1) * ONE - a
         forbidden = [(0, corner), (corner + ONE, corner + ONE), (corner + 2 * ONE, AROUND)]
         for m in (1, 2):
-            wall = mesh.wall[3 * t + (k + m) % 3]
-            if wall >= 0 and (branch - wall) % 4 != 3:
+            if not mesh.gate[3 * t + (k + m) % 3] >> branch & 1:
                 forbidden.append((corner + (m - 1) * ONE, corner + m * ONE))
         for p, q, other, _, _, host in chords:
             if host is not None and on_left(host, a) != on_left(host, p):

@@ -54,10 +54,14 @@ class TraceMesh:
         Branch in the neighbour minus branch here.
     wall : list of int
         Branch of a boundary half-edge's direction, -1 inside.
+    gate : list of int
+        Branches (bits) that may leave the triangle through a half-edge.
     row : list of int
         Row of `FaceMesh.boundary` that a boundary half-edge is part of, -1 inside.
     span : list of (float, float)
         The part of that row, as fractions.
+    on_boundary : list of bool
+        Per vertex.
     ex, ey, ux, uy : list of float
         Vector of the half-edge, and of unit length.
     constant, gx, gy : list of float
@@ -72,8 +76,10 @@ class TraceMesh:
     twin: list[int]
     shift: list[int]
     wall: list[int]
+    gate: list[int]
     row: list[int]
     span: list[tuple[float, float]]
+    on_boundary: list[bool] = field(default_factory=list)
     ex: list[float] = field(default_factory=list)
     ey: list[float] = field(default_factory=list)
     ux: list[float] = field(default_factory=list)
@@ -147,11 +153,14 @@ def trace_mesh(mesh: FaceMesh, surface: SurfaceMesh, aligned: AlignedField, seed
         twin=twin.tolist(),
         shift=(shift.astype(np.int64) % 4).tolist(),
         wall=np.where(twin < 0, wall.astype(np.int64) % 4, -1).tolist(),
+        gate=np.where(twin < 0, 1 << (wall.astype(np.int64) + 3) % 4, 15).tolist(),
         row=row.tolist(),
         span=[(0.0, 1.0)] * len(twin),
     )
     crowded = seed[mesh.triangles].sum(axis=1) > 1
-    _separate(out, set(np.flatnonzero(seed).tolist()), np.flatnonzero(crowded).tolist())
+    seeds = set(np.flatnonzero(seed).tolist())
+    _separate(out, seeds, np.flatnonzero(crowded).tolist())
+    _guard_boundary(out, seeds)
     _prepare(out)
     return out
 
@@ -201,7 +210,7 @@ def _bisect_triangle(mesh: TraceMesh, h: int, middle: int) -> tuple[int, int]:
     lo, hi = mesh.span[h]
     mesh.span += [(0.5 * (lo + hi), hi), mesh.span[n], (0.0, 1.0)]
     mesh.span[h], mesh.span[n] = (lo, 0.5 * (lo + hi)), (0.0, 1.0)
-    for data_, inner in ((mesh.shift, 0), (mesh.wall, -1), (mesh.row, -1)):
+    for data_, inner in ((mesh.shift, 0), (mesh.wall, -1), (mesh.gate, 15), (mesh.row, -1)):
         data_ += [data_[h], data_[n], inner]
         data_[n] = inner
     outer = mesh.twin[n]
@@ -212,8 +221,23 @@ def _bisect_triangle(mesh: TraceMesh, h: int, middle: int) -> tuple[int, int]:
     return h, half
 
 
+def _guard_boundary(mesh: TraceMesh, seeds: set[int]) -> None:
+    """Gates at the spokes of regular boundary vertices: what runs along the boundary passes them, it does not turn back there."""
+    for h, wall in enumerate(mesh.wall):
+        if wall < 0 or mesh.start[h] in seeds:
+            continue
+        along = wall
+        for g in mesh.star(h)[1:]:
+            mesh.gate[mesh.twin[g]] &= ~(1 << along)
+            along = (along + mesh.shift[mesh.twin[g]]) % 4
+            mesh.gate[g] &= ~(1 << (along + 2) % 4)
+
+
 def _prepare(mesh: TraceMesh) -> None:
-    """Edge vectors and the linear function of every triangle."""
+    """Edge vectors, the linear function of every triangle, and vertices on the boundary."""
+    mesh.on_boundary = [False] * len(mesh.points)
+    for v, wall in zip(mesh.start, mesh.wall):
+        mesh.on_boundary[v] |= wall >= 0
     x, y, v = (np.array(a).reshape(-1, 3) for a in (mesh.x, mesh.y, mesh.value))
     ex, ey = np.roll(x, -1, axis=1) - x, np.roll(y, -1, axis=1) - y
     length = np.hypot(ex, ey)
