@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..embed.quality import scaled_jacobian
+from ..field.surface_mesh import SurfaceMesh
 from ..records import Float, Int
 
 if TYPE_CHECKING:
@@ -109,14 +110,58 @@ def _quality_colours(value: Float) -> Int:
 
 
 def _crosses(fields: tuple[FaceField, ...], cell: float, frame: Float) -> Float:
-    """Arms (k, 2, 3) of about one cross per cell of a square grid."""
-    out = []
+    """Arms (k, 2, 3) of crosses at the points of a square grid.
+
+    At a point with barycentric coordinates l the fourth power of the cross is ``sum_k (1 - 2 l_opposite(k)) u_k``, from its
+    values u_k at the three edges of the triangle (Crouzeix-Raviart interpolation).
+    """
+    from scipy.spatial import cKDTree
+
+    out = [np.zeros((0, 2, 3))]
     for f in fields:
-        bins = np.floor(f.places @ frame[:2].T / cell).astype(np.int64)
-        rows = np.sort(np.unique(bins, axis=0, return_index=True)[1])
-        for arm in (f.directions[rows], np.cross(f.normal, f.directions[rows])):
-            out.append(np.stack([f.places[rows] - 0.36 * cell * arm, f.places[rows] + 0.36 * cell * arm], axis=1))
-    return np.concatenate(out) if out else np.zeros((0, 2, 3))
+        flat = f.points @ frame[:2].T
+        low, high = np.floor(flat.min(axis=0) / cell), np.ceil(flat.max(axis=0) / cell)
+        axes = [(np.arange(a, b) + 0.5) * cell for a, b in zip(low, high, strict=True)]
+        grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        corner = flat[f.triangles]
+        near = cKDTree(corner.mean(axis=1)).query(grid, k=min(12, len(corner)))[1].reshape(len(grid), -1)
+        c = corner[near]
+        area = _area(c[:, :, 0], c[:, :, 1], c[:, :, 2])
+        p = np.broadcast_to(grid[:, None], c[:, :, 0].shape)
+        weight = np.stack([_area(c[:, :, (k + 1) % 3], c[:, :, (k + 2) % 3], p) for k in range(3)], axis=-1)
+        weight = np.divide(weight, area[..., None], out=np.full(weight.shape, -1.0), where=area[..., None] != 0.0)
+        inside = weight.min(axis=-1) >= 0.0
+        rows = np.flatnonzero(inside.any(axis=1))
+        column = inside[rows].argmax(axis=1)
+        triangle, weight = near[rows, column], weight[rows, column]
+        x = f.directions[0]
+        y = np.cross(f.normal, x)
+        fourth = (f.directions @ x + 1j * (f.directions @ y)) ** 4
+        edges = SurfaceMesh(f.points, f.triangles).triangle_edges[triangle]
+        value = (fourth[edges] * (1 - 2 * np.roll(weight, 1, axis=1))).sum(axis=1)
+        angle = np.angle(value)[:, None] / 4
+        first = np.cos(angle) * x + np.sin(angle) * y
+        place = np.einsum("gk,gkc->gc", weight, f.points[f.triangles[triangle]])
+        out += [
+            np.stack([place - 0.36 * cell * arm, place + 0.36 * cell * arm], axis=1) for arm in (first, np.cross(f.normal, first))
+        ]
+    return np.concatenate(out)
+
+
+def _area(a: Float, b: Float, c: Float) -> Float:
+    """Twice the signed area of triangles in the plane."""
+    u, v = b - a, c - a
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def _spots(points: Float, index: Int) -> tuple[Markers, ...]:
+    """Discs where fewer than four meet, squares where more do."""
+    out = []
+    for few, colour in ((True, VERMILLION), (False, BLUE)):
+        chosen = points[(index > 0) if few else (index < 0)]
+        if len(chosen):
+            out.append(Markers(chosen, colour, 8.0, not few))
+    return tuple(out)
 
 
 def _count(n: int, what: str) -> str:
@@ -144,13 +189,11 @@ def build_scene(result: MeshResult) -> Scene:
     start, end = mesh.quads, np.roll(mesh.quads, -1, axis=1)
     keep = (start < end).ravel()
     grid = np.stack([points[start.ravel()[keep]], points[end.ravel()[keep]]], axis=1)
-    spots = []
-    counts = []
-    for sign, colour, square, label in ((1, VERMILLION, False, "+"), (-1, BLUE, True, "−")):
-        chosen = [s.point for s in result.singularities if s.index * sign > 0]
-        if chosen:
-            spots.append(Markers(np.array(chosen) @ frame.T, colour, 9.0, square))
-        counts.append(f"{len(chosen)} {label}¼")
+    sign = np.array([s.index for s in result.singularities], np.int64)
+    spots = _spots(np.array([s.point for s in result.singularities]).reshape(-1, 3) @ frame.T, sign)
+    valence = np.bincount(mesh.quads.ravel(), minlength=len(points))
+    inside = np.concatenate(mesh.face_nodes)
+    corners = _spots(points[inside], 4 - valence[inside])
     tints = _block_colours(layout)
     fields = result.field
     offset = np.cumsum([0, *(len(f.points) for f in fields)])
@@ -161,12 +204,12 @@ def build_scene(result: MeshResult) -> Scene:
     value = scaled_jacobian(mesh.points, mesh.quads, result.normals[mesh.quad_face])
     panels = (
         Panel(
-            f"cross field: singularities {counts[0]}, {counts[1]}",
+            f"cross field: {(sign > 0).sum()} singularities of +¼, {(sign < 0).sum()} of −¼",
             ground,
             triangles,
             flat,
             (Lines(_crosses(fields, cell, frame) @ frame.T, BLUE, 1.1), Lines(outline, INK, 2.0)),
-            tuple(spots),
+            spots,
         ),
         Panel(
             f"layout: {_count(quality.blocks, 'block')}",
@@ -174,7 +217,7 @@ def build_scene(result: MeshResult) -> Scene:
             mesh.quads,
             tints[order],
             (Lines(inner, INK, 1.2), Lines(outline, INK, 2.0)),
-            tuple(spots),
+            corners,
         ),
         Panel(
             f"mesh: {_count(quality.quads, 'quad')}, scaled Jacobian min {quality.min_scaled_jacobian:.2f}, "

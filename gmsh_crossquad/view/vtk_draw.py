@@ -129,7 +129,7 @@ def draw(scene: Scene, path: str) -> None:
         style.SetColor(0.12, 0.13, 0.16)
         style.SetJustificationToCentered()
         caption.SetDisplayPosition(int(size[0] / 2), 14)
-        renderer.AddActor2D(caption)
+        renderer.AddViewProp(caption)
         camera = renderer.GetActiveCamera()
         middle = scene.extent.mean(axis=0)
         depth = float(np.abs(panel.points[:, 2]).max(initial=0.0)) + float(extent.max())
