@@ -1,25 +1,189 @@
-"""Nodes of the background mesh on the curves."""
+"""Nodes of the background mesh on the curves: fine where the field needs it, and no finer.
+
+The spacing h along the curves is the greatest function that keeps
+
+- the size of the faces beside the curve (`face_sizes`),
+- a bounded turning per segment, and a least number of segments per curve,
+- a part of the gap between boundary parts that face each other (`gaps`),
+- a part of all this at sharp and re-entrant corners and at the tips of cracks, where the field is singular,
+
+and that grows with a bounded slope: ``h(x) <= h(y) + g |x - y|``.  That bound is a shortest-path problem: on the graph of
+neighbouring cells, with edge weights ``g |x - y|`` and an edge of weight h(y) from a source to every y, h is the distance from
+the source (one run of Dijkstra's algorithm).  Cells are refined and measured again until they are as fine as the spacing.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..options import MeshOptions
-from ..records import Float, Model
+from ..records import Float, Int, Model
+from .cells import Cells, Track
+from .gaps import Neighbours, Uses, neighbours
 
 __all__ = ["curve_spacing", "face_sizes"]
 
+DIVISIONS = 40.0  # of a face's diameter
+TRIANGLES, FACE_TRIANGLES = 3000.0, 100.0  # wanted in the model, and at least in a face, where there are many
+GROWTH = 0.3
+TURN, TURN_SMALL = np.radians(12.0), np.radians(18.0)  # per segment: usually, and where segments are small anyway
+SMALL_TURN = 0.004  # least spacing because of turning, over that elsewhere
+GAP = 0.5  # spacing over gap
+CORNER = 0.5  # spacing at sharp and re-entrant corners over that elsewhere
+TIP = 0.35
+SHARP, REENTRANT = np.radians(60.0), np.radians(200.0)
+ROUNDS = 6
+MAX_CELLS = 20_000
+MAX_NODES = 6_000
+SMALLEST = 1e-7  # of the model
+
 
 def face_sizes(model: Model, options: MeshOptions) -> Float:
-    """Greatest triangle size (f,) of every face, scaled."""
-    diameter = []
-    for face in model.faces:
-        p = np.concatenate([model.curves[c].points for loop in face.loops for c, _ in loop])
-        diameter.append(np.linalg.norm(np.ptp(p, axis=0)))
-    return np.array(diameter) / 40 * options.background
+    """Greatest triangle size of every face.
+
+    A 40th of its diameter; in a model of many faces coarser, down to about 100 triangles in a face.
+
+    Parameters
+    ----------
+    model : Model
+    options : MeshOptions
+
+    Returns
+    -------
+    (f,) float64, scaled
+    """
+    out = np.zeros(len(model.faces))
+    wanted = max(FACE_TRIANGLES, TRIANGLES / len(model.faces))
+    for row, face in enumerate(model.faces):
+        area, low, high = 0.0, np.full(2, np.inf), np.full(2, -np.inf)
+        for loop in face.loops:
+            for c, sign in loop:
+                xy = face.local(model.curves[c].points)
+                x, y = xy.T
+                area += 0.5 * sign * float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
+                low, high = np.minimum(low, xy.min(axis=0)), np.maximum(high, xy.max(axis=0))
+        diameter = float(np.linalg.norm(high - low))
+        even = np.sqrt(2.3 * abs(area) / wanted)
+        out[row] = max(diameter / DIVISIONS, min(diameter / 8.0, even))
+    return out * options.background
 
 
 def curve_spacing(model: Model, options: MeshOptions) -> tuple[Float, ...]:
-    """Arc lengths of the background nodes of every curve, 0 and the length included."""
-    h = face_sizes(model, options).min()
-    return tuple(np.linspace(0, c.length, max(12 if c.closed else 4, int(np.ceil(c.length / h))) + 1) for c in model.curves)
+    """Background nodes of all curves, the same for all faces of a curve.
+
+    Parameters
+    ----------
+    model : Model
+    options : MeshOptions
+        `background` is a factor on all sizes.
+
+    Returns
+    -------
+    tuple of (k + 1,) float64
+        For every curve increasing arc lengths, 0 and the length included; at least 2 segments, 8 on a closed curve.
+    """
+    track, uses = Track(model), Uses.of(model)
+    coarsest = np.full(len(model.curves), np.inf)
+    np.minimum.at(coarsest, uses.curve, face_sizes(model, options)[uses.face])
+    closed = np.array([c.closed for c in model.curves])
+    least = np.where(closed, 8, np.where(track.length > coarsest, 4, np.where(track.length > 0.5 * coarsest, 3, 2)))
+    base = np.minimum(coarsest, track.length / least)
+    corner = _corner_sizes(model, uses, base)
+
+    density = track.s / (0.5 * base)[track.curve] + track.turning / np.radians(10.0)
+    share = density[track.last] - density[track.first]
+    s, curve = track.divide(density, np.maximum(8, np.ceil(share)).astype(np.int64), track.curve, track.s)
+    cells = track.cells(s, curve)
+    factor = GAP * options.background
+    for round_ in range(ROUNDS):
+        near = neighbours(model, cells, uses)
+        h = _limited(model, track, cells, near, base, corner, factor, options.background)
+        if round_ + 1 == ROUNDS or (cells.length <= 1.2 * h).all() or len(cells.curve) > MAX_CELLS:
+            break
+        s, curve = _divide(track, cells, h / 1.7, least)
+        cells = track.cells(s, curve)
+    for _ in range(20):
+        s, curve = _divide(track, cells, h, least)
+        if len(s) <= MAX_NODES + 2 * int(least.sum()):
+            break
+        # too many: only what narrow gaps ask for may be coarser
+        factor *= 1.5
+        h = _limited(model, track, cells, near, base, corner, factor, options.background)
+    return tuple(np.split(s, np.flatnonzero(np.diff(curve)) + 1))
+
+
+def _divide(track: Track, cells: Cells, h: Float, least: Int) -> tuple[Float, Int]:
+    """Divide all curves by the density 1 / h given on cells."""
+    first = cells.first[:-1]
+    pieces = cells.length / h
+    total = np.cumsum(pieces)
+    # cumulative density at both ends of every cell; only differences on one curve count
+    density = np.stack([total - pieces, total], axis=1).ravel()
+    share = np.add.reduceat(pieces, first)
+    counts = np.maximum(least, np.ceil(share - 1e-9)).astype(np.int64)
+    s = np.stack([cells.start, cells.end], axis=1).ravel()
+    return track.divide(density, counts, np.repeat(cells.curve, 2), s)
+
+
+def _corner_sizes(model: Model, uses: Uses, base: Float) -> Float:
+    """Spacing (v,) at CAD vertices, infinite where nothing asks for it."""
+    ends = np.array([(c.start, c.end) for c in model.curves])
+    local = np.full(len(model.vertices), np.inf)
+    np.minimum.at(local, ends.ravel(), np.repeat(base, 2))
+    out = np.full(len(model.vertices), np.inf)
+    first = np.stack([c.points[1] - c.points[0] for c in model.curves])
+    last = np.stack([c.points[-2] - c.points[-1] for c in model.curves])
+    for face in model.faces:
+        leave = np.stack([first @ face.axes.T, last @ face.axes.T], axis=1)
+        for loop in face.loops:
+            rows = np.array([c for c, _ in loop])
+            forward = np.array([sign > 0 for _, sign in loop])
+            outgoing = leave[rows, np.where(forward, 0, 1)]
+            incoming = np.roll(leave[rows, np.where(forward, 1, 0)], 1, axis=0)
+            vertex = ends[rows, np.where(forward, 0, 1)]
+            cross = outgoing[:, 0] * incoming[:, 1] - outgoing[:, 1] * incoming[:, 0]
+            angle = np.mod(np.arctan2(cross, np.einsum("ij,ij->i", outgoing, incoming)), 2 * np.pi)
+            special = (angle < SHARP) | (angle > REENTRANT)
+            np.minimum.at(out, vertex[special], CORNER * local[vertex[special]])
+        for c in face.embedded_curves:
+            if not model.curves[c].closed:
+                out[ends[c]] = np.minimum(out[ends[c]], TIP * local[ends[c]])
+    return out
+
+
+def _limited(
+    model: Model, track: Track, cells: Cells, near: Neighbours, base: Float, corner: Float, factor: float, background: float
+) -> Float:
+    """Spacing (n,) on every cell."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import dijkstra
+
+    n, v = len(cells.curve), len(model.vertices)
+    h = np.concatenate([base[cells.curve], corner])
+    # a turn that is far smaller than the cells around it (a knot of a spline) is passed over
+    rate = np.clip(track.turning_rate(cells), 1e-12, TURN / (SMALL_TURN * base[cells.curve]))
+    small = base[cells.curve] / 3.0
+    h[:n] = np.minimum(h[:n], background * np.clip(small / background, TURN / rate, TURN_SMALL / rate))
+    narrow = np.isfinite(near.gap)
+    pair, width = near.pair[narrow], factor * near.gap[narrow]
+    # curves that meet have no gap where they meet: there a part of the spacing is the limit
+    size = np.where(pair < n, base[cells.curve[np.minimum(pair, n - 1)]], np.inf).min(axis=1)
+    width = np.maximum(width, np.where(near.joined[narrow], TIP * size, SMALLEST))
+    np.minimum.at(h, pair.ravel(), np.repeat(width, 2))
+
+    inner = np.setdiff1d(np.arange(n), cells.first[:-1])
+    ends = np.array([(c.start, c.end) for c in model.curves])
+    a = np.concatenate([near.pair[:, 0], inner - 1, cells.first[:-1], cells.first[1:] - 1])
+    b = np.concatenate([near.pair[:, 1], inner, n + ends[:, 0], n + ends[:, 1]])
+    half = 0.5 * cells.length
+    weight = np.concatenate([near.distance, half[inner - 1] + half[inner], half[cells.first[:-1]], half[cells.first[1:] - 1]])
+    key = np.minimum(a, b) * (n + v) + np.maximum(a, b)
+    order = np.lexsort((weight, key))
+    order = order[np.concatenate([[True], np.diff(key[order]) > 0])]
+    a, b, weight = a[order], b[order], GROWTH * weight[order]
+    known = np.flatnonzero(np.isfinite(h))
+    rows = np.concatenate([a, b, np.full(len(known), n + v)])
+    columns = np.concatenate([b, a, known])
+    values = np.concatenate([weight, weight, h[known]])
+    graph = coo_array((values, (rows, columns)), shape=(n + v + 1, n + v + 1)).tocsr()
+    return np.asarray(dijkstra(graph, indices=[n + v]))[0, :n]
