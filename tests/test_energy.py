@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gmsh_crossquad.embed.curve_table import CurveTable
 from gmsh_crossquad.embed.energy import AREA_WEIGHT, corner_areas, corner_energy, corner_hessian
 from gmsh_crossquad.embed.grid_energy import GridEnergy
 from gmsh_crossquad.embed.quality import CHUNK, guide_quality, scaled_jacobian
@@ -108,9 +109,9 @@ GRIDS = {
 @pytest.mark.parametrize(("eps", "power", "amplitude"), [(0.0, 4, 0.01), (0.3, 1, 0.3)])
 def test_gradient_of_a_grid(name: str, eps: float, power: int, amplitude: float) -> None:
     guide, model = GRIDS[name]
-    guide = spread_chains(shaken(guide, model, amplitude, 4, slide=eps > 0), model)
-    rest = rest_lengths(guide, model)
-    grid = GridEnergy(guide, model, rest)
+    guide = spread_chains(shaken(guide, model, amplitude, 4, slide=eps > 0), model, CurveTable(model.curves))
+    rest = rest_lengths(guide, model, CurveTable(model.curves))
+    grid = GridEnergy(guide, model, CurveTable(model.curves), rest)
     z = 0.01 * np.random.default_rng(1).normal(size=grid.size)
     energy, gradient = grid.value(z, rest.sides, eps, power)
     assert np.isfinite(energy)
@@ -126,8 +127,8 @@ def test_gradient_of_a_grid(name: str, eps: float, power: int, amplitude: float)
 
 def test_factor_solves_with_a_positive_definite_matrix() -> None:
     guide, model = GRIDS["fold"]
-    rest = rest_lengths(guide, model)
-    grid = GridEnergy(guide, model, rest)
+    rest = rest_lengths(guide, model, CurveTable(model.curves))
+    grid = GridEnergy(guide, model, CurveTable(model.curves), rest)
     z = np.zeros(grid.size)
     solve = grid.factor(z, rest.sides, 0.0, 4)
     inverse = np.column_stack([solve(column) for column in np.eye(grid.size)])
@@ -137,7 +138,7 @@ def test_factor_solves_with_a_positive_definite_matrix() -> None:
 
 def test_zero_is_the_given_guide() -> None:
     guide, model = GRIDS["fold"]
-    grid = GridEnergy(guide, model, rest_lengths(guide, model))
+    grid = GridEnergy(guide, model, CurveTable(model.curves), rest_lengths(guide, model, CurveTable(model.curves)))
     points, arclength = grid.positions(np.zeros(grid.size))
     assert points == pytest.approx(guide.points, abs=1e-14)
     assert (arclength == guide.arclength).all()

@@ -79,7 +79,7 @@ def gaps(guide: Guide, model: Model, row: int) -> Float:
 def test_spread_chains_gives_strict_order(seed: int) -> None:
     guide, model = mapped_grid(sector(0.3, 1.0, 2.0), 3, 6)
     guide = shaken(guide, model, 0.0, seed)
-    spread = spread_chains(guide, model)
+    spread = spread_chains(guide, model, CurveTable(model.curves))
     for row, curve in enumerate(model.curves):
         mean = curve.length / (len(guide.chains[row]) - 1)
         assert gaps(spread, model, row).min() > 0.999 * LEAST_GAP * mean
@@ -88,12 +88,12 @@ def test_spread_chains_gives_strict_order(seed: int) -> None:
 
 def test_spread_chains_leaves_good_chains_alone_and_opens_ties() -> None:
     guide, model = mapped_grid(rectangle(), 4, 4)
-    kept = spread_chains(guide, model)
+    kept = spread_chains(guide, model, CurveTable(model.curves))
     assert (kept.arclength == guide.arclength).all()
     arclength = guide.arclength.copy()
     chain = guide.chains[0]
     arclength[chain[2]] = arclength[chain[1]]
-    opened = spread_chains(replace(guide, arclength=arclength), model)
+    opened = spread_chains(replace(guide, arclength=arclength), model, CurveTable(model.curves))
     assert gaps(opened, model, 0).min() == pytest.approx(LEAST_GAP * 0.25)
     assert (opened.arclength[guide.chains[1]] == guide.arclength[guide.chains[1]]).all()
 
@@ -105,7 +105,7 @@ def test_spread_chains_refuses_prescribed_nodes_in_the_wrong_order() -> None:
     fixed[[first, second]] = True
     arclength[[first, second]] = arclength[[second, first]]
     with pytest.raises(MeshError, match="curve 3"):
-        spread_chains(replace(guide, fixed=fixed, arclength=arclength), model)
+        spread_chains(replace(guide, fixed=fixed, arclength=arclength), model, CurveTable(model.curves))
 
 
 def test_grid_edges() -> None:
@@ -118,14 +118,14 @@ def test_grid_edges() -> None:
 def test_laplace_start_restores_an_even_grid(make) -> None:  # type: ignore[no-untyped-def]
     """An affine grid solves the uniform Laplace equation."""
     guide, model = make()
-    again = laplace_start(shaken(guide, model, 5.0, 2), model)
+    again = laplace_start(shaken(guide, model, 5.0, 2), model, CurveTable(model.curves))
     assert again.points == pytest.approx(guide.points, abs=1e-12)
 
 
 @pytest.mark.parametrize("make", [lambda: ring(3, 12, 0.5, 1.0), lambda: mapped_grid(sector(0.5, 1.0, 1.5), 4, 8)])
 def test_laplace_start_forgets_the_start(make) -> None:  # type: ignore[no-untyped-def]
     guide, model = make()
-    one, two = (laplace_start(shaken(guide, model, 1.0, seed), model) for seed in (1, 2))
+    one, two = (laplace_start(shaken(guide, model, 1.0, seed), model, CurveTable(model.curves)) for seed in (1, 2))
     assert one.points == pytest.approx(two.points, abs=1e-12)
     assert guide_quality(one, model).min() > 0.5
 
@@ -140,7 +140,7 @@ def edge_lengths(guide: Guide, sides: Float) -> tuple[Int, Float]:
 
 def test_rest_lengths_of_an_even_grid_are_its_edges() -> None:
     guide, model = mapped_grid(rectangle(3.0, 1.0), 6, 5)
-    rest = rest_lengths(guide, model)
+    rest = rest_lengths(guide, model, CurveTable(model.curves))
     assert rest.sides == pytest.approx(np.tile([[0.5], [0.2], [0.5], [0.2]], (1, 30)), rel=1e-12)
     assert rest.even == pytest.approx(np.sqrt(0.1), rel=1e-12)
     assert all(c == pytest.approx(gaps(guide, model, row), rel=1e-12) for row, c in enumerate(rest.chains))
@@ -152,7 +152,7 @@ def test_rest_lengths_fill_curves_and_faces(make, seed: int) -> None:  # type: i
     guide, model = make()
     random = np.random.default_rng(seed)
     guide = replace(guide, quad_size=guide.quad_size * np.exp(random.normal(size=guide.quad_size.shape)))
-    rest = rest_lengths(guide, model)
+    rest = rest_lengths(guide, model, CurveTable(model.curves))
     for curve, chain in zip(model.curves, rest.chains):
         assert chain.sum() == pytest.approx(curve.length, rel=1e-12)
     areas = 0.25 * (rest.sides[0] + rest.sides[2]) * (rest.sides[1] + rest.sides[3])
@@ -167,7 +167,7 @@ def test_a_thin_strip_in_the_layout_is_widened() -> None:
     guide, model = mapped_grid(rectangle(), 10, 10)
     size = guide.quad_size.copy()
     size[40:50, 0] /= 100.0
-    rest = rest_lengths(replace(guide, quad_size=size), model)
+    rest = rest_lengths(replace(guide, quad_size=size), model, CurveTable(model.curves))
     edges, length = edge_lengths(guide, rest.sides)
     across = np.abs(guide.points[edges[:, 0], 1] - guide.points[edges[:, 1], 1]) < 1e-9
     inside = across & (guide.points[edges[:, 0], 1] > 0.05) & (guide.points[edges[:, 0], 1] < 0.95)
@@ -184,7 +184,7 @@ def test_a_short_curve_keeps_its_length_and_the_others_theirs() -> None:
         return np.column_stack([u, v * (0.001 + 0.999 * u), 0.0 * u])
 
     guide, model = mapped_grid(mapping, 8, 1)
-    rest = rest_lengths(guide, model)
+    rest = rest_lengths(guide, model, CurveTable(model.curves))
     assert rest.chains[3] == pytest.approx([0.001], rel=1e-9)
     assert rest.chains[1] == pytest.approx([1.0], rel=1e-9)
     for row in (0, 2):

@@ -5,12 +5,15 @@ the edge,
 
     ordering  w/2 (g / r + r / g)                            a barrier: vertices on a curve never pass each other,
     turning   w (max(0, T / T0 - 1))^2                       keeps an edge from cutting off a strongly curved part,
-    grading   w (max(0, |log(g / g')| - log 2))^2            g' the next gap on the same curve.
+    grading   w (max(0, |log(g / g')| - log k))^2            g' the next gap: on the same curve with k = 2, or round a CAD
+                                                             vertex on another one with k = 3.
 
 Its Hessian is the Gauss-Newton one, positive semidefinite.
 """
 
 from __future__ import annotations
+
+from itertools import combinations
 
 import numpy as np
 
@@ -26,6 +29,7 @@ TURN_LIMIT = float(np.radians(50.0))
 """Angle from which the turning costs; with the weight it stays below 60 degrees where the number of edges allows it."""
 GRADE_WEIGHT = 50.0
 GRADE_LIMIT = float(np.log(2.0))
+CORNER_LIMIT = float(np.log(3.0))
 
 
 class ChainEnergy:
@@ -50,6 +54,7 @@ class ChainEnergy:
         ends = [np.zeros((0, 2), dtype=np.int64)]
         lengths = [np.zeros(0)]
         pairs = [np.zeros((0, 2), dtype=np.int64)]
+        ending: dict[int, list[int]] = {}
         held = edges = 0
         for c, chain in enumerate(guide.chains):
             if len(chain) < 2:
@@ -64,6 +69,9 @@ class ChainEnergy:
             lengths.append(rest[c])
             edge = edges + np.arange(len(chain) - 1)
             pairs.append(np.column_stack([edge[:-1], edge[1:]]))
+            if len(edge) > 1:  # a short curve of one edge must not make its neighbours short
+                ending.setdefault(int(chain[0]), []).append(int(edge[0]))
+                ending.setdefault(int(chain[-1]), []).append(int(edge[-1]))
             held += len(s)
             edges += len(edge)
         self._place, self._turning = np.concatenate(place), np.concatenate(turning)
@@ -73,9 +81,13 @@ class ChainEnergy:
         self._weight = np.where(moves, 1.0, 0.0)
         self._start, self._end = every.T
         self._rest = np.concatenate(lengths)
-        joint = np.concatenate(pairs)
-        joint = joint[np.any(moves[joint], axis=1)]
-        self._first, self._second = joint.T
+        corners = [pair for edges_there in ending.values() for pair in combinations(edges_there, 2)]
+        joint = np.concatenate([*pairs, np.array(corners, dtype=np.int64).reshape(-1, 2)])
+        limit = np.full(len(joint), GRADE_LIMIT)
+        limit[len(joint) - len(corners) :] = CORNER_LIMIT
+        kept: Bool = np.any(moves[joint], axis=1)
+        self._first, self._second = joint[kept].T
+        self._limit = limit[kept]
 
     @property
     def edges(self) -> Int:
@@ -83,9 +95,9 @@ class ChainEnergy:
         return np.column_stack([self._start, self._end])
 
     @property
-    def triples(self) -> Int:
-        """Start, middle and end (p, 3) of consecutive edges."""
-        return np.column_stack([self._start[self._first], self._end[self._first], self._end[self._second]])
+    def pairs(self) -> Int:
+        """Start and end of two neighbouring edges (p, 4), as in `edges`."""
+        return np.concatenate([self.edges[self._first], self.edges[self._second]], axis=1)
 
     def gaps(self, s: Float) -> Float:
         """Gaps (k,) between neighbours for places `s` (slide,)."""
@@ -135,8 +147,8 @@ class ChainEnergy:
         -------
         edges : (2, 2, k) float64
             Rows and columns as in `edges`; columns of fixed places are 0.
-        triples : (3, 3, p) float64
-            As in `triples`.
+        pairs : (4, 4, p) float64
+            As in `pairs`.
         """
         gap = self.gaps(s)
         none = np.zeros(len(self._place))
@@ -149,13 +161,13 @@ class ChainEnergy:
         one, two = self._first, self._second
         root = np.where(self._excess(gap) != 0.0, np.sqrt(2.0 * GRADE_WEIGHT), 0.0)
         left, right = -root / gap[one], root / gap[two]
-        by_log = np.stack([left * by_gap[0, one], left * by_gap[1, one] + right * by_gap[0, two], right * by_gap[1, two]])
+        by_log = np.concatenate([left * by_gap[:, one], right * by_gap[:, two]])
         return edges, by_log[:, None] * by_log
 
     def _excess(self, gap: Float) -> Float:
         log_gap = np.log(gap)
         step = log_gap[self._second] - log_gap[self._first]
-        return step - np.clip(step, -GRADE_LIMIT, GRADE_LIMIT)
+        return step - np.clip(step, -self._limit, self._limit)
 
     def _over(self, turning: Float) -> Float:
         angle = np.concatenate([turning, self._turning])

@@ -32,11 +32,13 @@ class GridEnergy:
     guide : Guide
         Fixes the topology and the origin z = 0.
     model : Model
+    table : CurveTable
+        Of the model's curves.
     rest : RestLengths
         Its `vertices` (the local lengths) and `chains`; the rest lengths of the quads come with every call.
     """
 
-    def __init__(self, guide: Guide, model: Model, rest: RestLengths) -> None:
+    def __init__(self, guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> None:
         self.guide = guide
         n = len(guide.points)
         used = np.zeros(n, dtype=bool)
@@ -45,7 +47,7 @@ class GridEnergy:
         self._slide = np.flatnonzero(used & (guide.curve >= 0) & ~guide.fixed)
         inner, slide = len(self._inner), len(self._slide)
         self.size = 2 * inner + slide
-        self._table = CurveTable(model.curves)
+        self._table = table
         self._curve, self._s0 = guide.curve[self._slide], guide.arclength[self._slide]
         self._inner_length = np.repeat(rest.vertices[self._inner], 2)
         self._slide_length = rest.vertices[self._slide]
@@ -82,11 +84,9 @@ class GridEnergy:
     def _set_pattern(self) -> None:
         """Column-compressed pattern of the Hessian and where its contributions go."""
         size, slide = self.size, len(self._slide)
-        edges, triples = (
-            np.where(t < slide, t + 2 * len(self._inner), size).T for t in (self._chains.edges, self._chains.triples)
-        )
+        edges, pairs = (np.where(t < slide, t + 2 * len(self._inner), size).T for t in (self._chains.edges, self._chains.pairs))
         rows, cols = [], []
-        for block in (self._freedom[:, self._nodes].swapaxes(0, 1).reshape(8, -1), edges, triples):
+        for block in (self._freedom[:, self._nodes].swapaxes(0, 1).reshape(8, -1), edges, pairs):
             shape = (len(block), len(block), block.shape[1])
             rows.append(np.broadcast_to(block[:, None], shape).ravel())
             cols.append(np.broadcast_to(block[None], shape).ravel())
@@ -171,8 +171,8 @@ class GridEnergy:
         corner = scale[:, self._nodes].swapaxes(0, 1)
         blocks *= corner[:, :, None, None]
         blocks *= corner
-        edges, triples = self._chains.hessian(s, world[:, 3], self._slide_length, derivative[:, 3])
-        values = np.concatenate([blocks.ravel(), edges.ravel(), triples.ravel()])
+        edges, pairs = self._chains.hessian(s, world[:, 3], self._slide_length, derivative[:, 3])
+        values = np.concatenate([blocks.ravel(), edges.ravel(), pairs.ravel()])
         data = np.asarray(np.bincount(self._target, values[self._kept], minlength=len(self._indices)), dtype=np.float64)
         data[self._diagonal] *= 1.0 + 1e-9
         matrix = csc_array((data, self._indices, self._indptr), shape=(self.size, self.size))

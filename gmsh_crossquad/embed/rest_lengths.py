@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import MeshError
 from ..records import Bool, Float, Guide, Int, Model
 from .curve_table import CurveTable
 from .start import chain_arclengths, grid_edges
@@ -57,13 +58,15 @@ class RestLengths:
     vertices: Float
 
 
-def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLengths:
+def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool = False) -> RestLengths:
     """Make the sizes of a guide grid consistent.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    table : CurveTable
+        Of the model's curves.
     actual : bool
         Take the geometric mean of `quad_size` and the present lengths of the edges instead of `quad_size` alone; the guide
         must have no edge without length.
@@ -71,6 +74,11 @@ def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLen
     Returns
     -------
     RestLengths
+
+    Raises
+    ------
+    MeshError
+        Where neighbours on a curve are not joined by an edge.
     """
     edges, quad_edges = grid_edges(guide.quads)
     count = np.bincount(quad_edges.ravel(), minlength=len(edges))
@@ -79,21 +87,20 @@ def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLen
     if actual:
         vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
         own = 0.5 * (own + 0.5 * np.log(np.einsum("ec,ec->e", vector, vector)))
-    chain_edges = _chain_edges(guide, edges)
+    chain_edges = _chain_edges(guide, model, edges)
     held = np.zeros(len(edges), dtype=bool)
-    table = CurveTable(model.curves)
     for row, rows in enumerate(chain_edges):
         fixed = guide.fixed[guide.chains[row]].copy()
         if len(fixed):
             fixed[[0, -1]] = True
-        single = fixed[:-1] & fixed[1:]
+        single: Bool = np.logical_and(fixed[:-1], fixed[1:])
         held[rows[single]] = True
         if len(rows):
             places = chain_arclengths(guide, model, row)
             own[rows[single]] = np.log(np.diff(places)[single])
             turning = np.diff(table.at(np.full(len(places), row), places)[0][:, 3])
             own[rows[~single]] -= np.log(np.maximum(turning[~single] / TURN, 1.0))
-    pairs = _neighbours(guide, edges, quad_edges)
+    pairs = _neighbours(guide, chain_edges, edges, quad_edges)
     length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held))
     chains = tuple(
         _fill_chain(length[rows], guide, model, row) if len(rows) else np.zeros(0) for row, rows in enumerate(chain_edges)
@@ -104,8 +111,8 @@ def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLen
     target = 0.25 * (per_quad[0] + per_quad[2]) * (per_quad[1] + per_quad[3])
     faces = len(model.faces)
     wanted = np.bincount(guide.quad_face, target, minlength=faces)
-    actual = np.abs(np.bincount(guide.quad_face, _signed_areas(guide, model), minlength=faces))
-    scale = np.sqrt(np.divide(actual, wanted, out=np.ones(faces), where=(wanted > 0.0) & (actual > 0.0)))[guide.quad_face]
+    area = np.abs(np.bincount(guide.quad_face, _signed_areas(guide, model), minlength=faces))
+    scale = np.sqrt(np.divide(area, wanted, out=np.ones(faces), where=(wanted > 0.0) & (area > 0.0)))[guide.quad_face]
     ends = edges.ravel()
     at_vertex = np.bincount(ends, np.repeat(np.log(length), 2), minlength=len(guide.points))
     degree = np.bincount(ends, minlength=len(guide.points))
@@ -117,18 +124,26 @@ def rest_lengths(guide: Guide, model: Model, *, actual: bool = False) -> RestLen
     )
 
 
-def _chain_edges(guide: Guide, edges: Int) -> list[Int]:
+def _chain_edges(guide: Guide, model: Model, edges: Int) -> list[Int]:
     """Row of `edges` of every edge of every chain."""
     base = len(guide.points)
     keys = edges[:, 0] * base + edges[:, 1]
     rows = []
-    for chain in guide.chains:
+    for row, chain in enumerate(guide.chains):
         ends = np.sort(np.column_stack([chain[:-1], chain[1:]]), axis=1)
-        rows.append(np.searchsorted(keys, ends[:, 0] * base + ends[:, 1]))
+        wanted = ends[:, 0] * base + ends[:, 1]
+        found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        if (keys[found] != wanted).any():
+            raise MeshError(
+                "neighbours on a curve are not joined by an edge of the guide grid",
+                entity=(1, model.curves[row].tag),
+                remedy="another size may help",
+            )
+        rows.append(found)
     return rows
 
 
-def _neighbours(guide: Guide, edges: Int, quad_edges: Int) -> Int:
+def _neighbours(guide: Guide, chain_edges: list[Int], edges: Int, quad_edges: Int) -> Int:
     """Pairs of edges that should have similar lengths (p, 2): opposite in a quad, or continuing at a vertex.
 
     Two edges continue each other at a vertex if it is regular and they share no quad there; on a curve if they follow
@@ -152,7 +167,7 @@ def _neighbours(guide: Guide, edges: Int, quad_edges: Int) -> Int:
     other = np.rint(total[at] - np.bincount(inverse, met.astype(float)) - edge).astype(np.int64)
     good = (times == 2) & (other > edge) & (other < len(edges))
     along = np.column_stack([edge[good], other[good]])
-    on_curves = [np.column_stack([rows[:-1], rows[1:]]) for rows in _chain_edges(guide, edges)]
+    on_curves = [np.column_stack([rows[:-1], rows[1:]]) for rows in chain_edges]
     return np.concatenate([across, along, *on_curves])
 
 

@@ -8,6 +8,7 @@
    until every corner has an area above `LEAST_AREA` of its rest area.
 3. If that fails, the same from the uniform Laplace start.
 4. *Polishing* towards the rest lengths with power 4 and eps = 0: a barrier, so that no corner can turn over.
+5. *Sharpening*: the same with power 12, which cares for the worst corners only, if these are still poor.
 
 The candidate with the greatest least scaled Jacobian is kept; above `GOOD` they count as equal, and the most polished one
 is kept for its sizes.
@@ -25,6 +26,7 @@ from functools import partial
 import numpy as np
 
 from ..records import Float, Guide, Int, Model
+from .curve_table import CurveTable
 from .grid_energy import GridEnergy
 from .minimise import minimise
 from .quality import guide_quality
@@ -35,8 +37,11 @@ __all__ = ["SmoothReport", "smooth"]
 
 ROUNDS = 12
 """Greatest number of untangling rounds per start."""
-POLISHING = (4, 8)
-"""Factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
+POLISHING = ((4, 4), (4, 8))
+"""Power and factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
+SHARPENING = (12, 6)
+"""The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
+WANTED = 0.85
 LEAST_AREA = 1e-3
 GOOD = 0.7
 
@@ -82,24 +87,28 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     MeshError
         Where prescribed nodes are not in order along a curve.
     """
-    given = spread_chains(guide, model)
-    rest = rest_lengths(given, model)
+    table = CurveTable(model.curves)
+    given = spread_chains(guide, model, table)
+    rest = rest_lengths(given, model, table)
     best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), "given", 0
     for name in ("given", "laplace"):
-        start = given if name == "given" else laplace_start(given, model)
-        candidate, used, valid = _untangle(start, model, rest)
+        start = given if name == "given" else laplace_start(given, model, table)
+        candidate, used, valid = _untangle(start, model, table, rest)
         rounds += used
         score = float(guide_quality(candidate, model).min())
         if score > quality or valid:
             best, quality, chosen = candidate, score, name
         if valid:
             break
-    for effort in POLISHING:
-        valid = quality > 0.0
-        polished = _polish(best, model, rest_lengths(best, model, actual=True) if valid else rest, effort, barrier=valid)
+    for power, effort in POLISHING:
+        polished = _polish(best, model, table, rest, power, effort, barrier=quality > 0.0)
         score = float(guide_quality(polished, model).min())
         if min(score, GOOD) >= min(quality, GOOD):
             best, quality = polished, score
+    if 0.0 < quality < WANTED:
+        polished = _polish(best, model, table, rest, *SHARPENING, barrier=True)
+        if guide_quality(polished, model).min() > quality:
+            best = polished
     final = guide_quality(best, model)
     return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen)
 
@@ -109,9 +118,9 @@ def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
     return replace(guide, points=points, arclength=arclength)
 
 
-def _untangle(guide: Guide, model: Model, rest: RestLengths) -> tuple[Guide, int, bool]:
+def _untangle(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, int, bool]:
     """Minimise the regularised energy until no corner is turned over: the result, the rounds, and whether it is valid."""
-    grid = GridEnergy(guide, model, rest)
+    grid = GridEnergy(guide, model, table, rest)
     z = np.zeros(grid.size)
     sides = rest.even
     least = float(grid.areas(z, sides).min())
@@ -133,12 +142,14 @@ def _untangle(guide: Guide, model: Model, rest: RestLengths) -> tuple[Guide, int
     return _moved(guide, grid, z), rounds, least > 0.0
 
 
-def _polish(guide: Guide, model: Model, rest: RestLengths, effort: int, barrier: bool) -> Guide:
-    """Minimise the energy with the graded rest lengths; inside the barrier if there is none turned over."""
-    grid = GridEnergy(guide, model, rest)
+def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
+    """Minimise the energy with graded rest lengths, inside the barrier; from a tangled grid with eps > 0 and power 1."""
+    if barrier:
+        rest = rest_lengths(guide, model, table, actual=True)
+    grid = GridEnergy(guide, model, table, rest)
     if not grid.size:
         return guide
-    eps, power = (0.0, 4) if barrier else (1e-3, 1)
+    eps, power = (0.0, power) if barrier else (1e-3, 1)
     result = minimise(
         partial(grid.value, sides=rest.sides, eps=eps, power=power),
         partial(grid.factor, sides=rest.sides, eps=eps, power=power),

@@ -59,13 +59,15 @@ def chain_arclengths(guide: Guide, model: Model, row: int) -> Float:
     return places
 
 
-def spread_chains(guide: Guide, model: Model, even: bool = False) -> Guide:
+def spread_chains(guide: Guide, model: Model, table: CurveTable, even: bool = False) -> Guide:
     """Bring the vertices on every curve into strict order, changing as little as possible.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    table : CurveTable
+        Of the model's curves.
     even : bool
         Even gaps between the fixed vertices instead.
 
@@ -108,17 +110,19 @@ def spread_chains(guide: Guide, model: Model, even: bool = False) -> Guide:
                 arclength[chain[low + 1 : high]] = places[low] + np.cumsum(gap[low : high - 1])
     free = np.flatnonzero((guide.curve >= 0) & ~guide.fixed)
     points = guide.points.copy()
-    points[free] = CurveTable(model.curves).at(guide.curve[free], arclength[free])[0][:, :3]
+    points[free] = table.at(guide.curve[free], arclength[free])[0][:, :3]
     return replace(guide, points=points, arclength=arclength)
 
 
-def laplace_start(guide: Guide, model: Model) -> Guide:
+def laplace_start(guide: Guide, model: Model, table: CurveTable) -> Guide:
     """Even gaps on the curves, uniform Laplace in the interior.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    table : CurveTable
+        Of the model's curves.
 
     Returns
     -------
@@ -128,7 +132,7 @@ def laplace_start(guide: Guide, model: Model) -> Guide:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 
-    guide = spread_chains(guide, model, even=True)
+    guide = spread_chains(guide, model, table, even=True)
     edges, _ = grid_edges(guide.quads)
     n = len(guide.points)
     free = np.zeros(n, dtype=bool)
