@@ -11,6 +11,7 @@ import meshio
 import pytest
 
 import gmsh_crossquad as cq
+import gmsh_crossquad.api  # loaded once here, not in every child process
 from gmsh_crossquad import child, cli, formats, progress
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import gmsh_crossquad as cq
+import gmsh_crossquad.api  # loaded once here, not in every child process
 from gmsh_crossquad import cli
 
 SQUARE = """

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+import gmsh_crossquad.api
+import gmsh_crossquad.check  # noqa: F401  loaded once here, not in every child process
 from gmsh_crossquad import cli
 
 GEO = Path(__file__).resolve().parent.parent / "geo"
