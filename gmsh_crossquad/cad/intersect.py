@@ -21,7 +21,7 @@ __all__ = ["Contact", "contacts"]
 CHUNK = 16
 CLOSE = 4e-6  # of the model: twice the deviation of the samples of two curves, and a margin
 TOUCH = 1e-9  # of the model
-FINE = 16
+FINE = 64  # leaves 1/4096 of the samples' deviation
 BLOCK = 1 << 20  # pairs handled at once
 
 

@@ -3,7 +3,8 @@
 A curve is bisected in its parameter until every segment deviates from the curve by less than `DEVIATION` of the model
 and turns by less than `TURNING`.  With m the curve's point at the middle parameter of the segment (a, b), the
 deviation is the distance of m from the chord and the turning twice the angle between (a, m) and (m, b).  All middle
-points are kept, which divides the turning by two and the deviation by four.  Straight lines get three points.
+points are kept, which divides the turning by two and the deviation by four.  Straight lines get three points; the
+number that arcs of circles need is known after the first samples.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ DEVIATION = 1e-6  # of the model, for the final samples
 TURNING = np.radians(2.0)  # per final segment
 SHORTEST = 1e-5  # of the model: at a kink the bisection ends here
 MAX_SAMPLES = 2000
+ALIKE = 1e-2  # arcs of circles have one deviation everywhere
 FIRST_SEGMENTS = {"Line": 2, "Circle": 16, "Ellipse": 16}
 OTHER_SEGMENTS = 64
 
@@ -118,8 +120,11 @@ def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) 
     """
     if kind == "Line" or kind.startswith("Discrete"):
         return parameters, points
-    if kind == "Circle":
-        return _uniform(tag, parameters, points, scale)
+    if kind in ("Circle", "Ellipse"):
+        deviation, turning, _ = _error(points[:-2:2], points[1:-1:2], points[2::2])
+        if np.ptp(deviation) <= ALIKE * deviation.max():
+            finer = max(np.sqrt(0.25 * deviation.max() / (DEVIATION * scale)), 0.5 * turning.max() / TURNING, 1.0)
+            return _uniform(tag, parameters, points, finer)
     check = np.ones(len(parameters) - 1, bool)
     for _ in range(24):
         rows = np.flatnonzero(check)
@@ -137,10 +142,8 @@ def refine(tag: int, kind: str, parameters: Float, points: Float, scale: float) 
     return parameters, points
 
 
-def _uniform(tag: int, parameters: Float, points: Float, scale: float) -> tuple[Float, Float]:
-    """The same for a circle, whose segments are all alike: deviation falls with the square of their number."""
-    deviation, turning, _ = _error(points[:1], points[1:2], points[2:3])
-    finer = max(np.sqrt(0.25 * deviation[0] / (DEVIATION * scale)), turning[0] / TURNING, 1.0)
+def _uniform(tag: int, parameters: Float, points: Float, finer: float) -> tuple[Float, Float]:
+    """Replace all segments, which are alike, by `finer` times as many; the ends stay as they are."""
     count = min((len(parameters) - 1) * int(np.ceil(finer)), MAX_SAMPLES - 1)
     parameters = np.linspace(parameters[0], parameters[-1], count + 1)
     return parameters, np.concatenate([points[:1], evaluate(tag, parameters[1:-1]), points[-1:]])

@@ -20,6 +20,7 @@ __all__ = ["validate"]
 NO_WIDTH = 1e-9  # of the face's size
 SHARPEST = np.radians(0.5)
 SAME = 1e-9  # of the model
+ON_CURVE = 1e-6  # of the model: the accuracy of the samples
 LIPS = 1e-6  # of the model: lips of a crack that are drawn twice
 
 
@@ -162,6 +163,13 @@ def _check_embedded(model: Model, face: Face, flat: dict[int, Float]) -> None:
             raise GeometryError(
                 "the embedded point is outside its surface", entity=(0, int(model.vertex_tags[v])), location=place
             )
+
+
+def _distance(point: Float, line: Float) -> float:
+    """Distance of a point from a polyline."""
+    a, d = line[:-1], np.diff(line, axis=0)
+    t = np.clip(((point - a) * d).sum(1) / (d**2).sum(1), 0.0, 1.0)
+    return float(np.sqrt((((a + t[:, None] * d) - point) ** 2).sum(1).min()))
 
 
 def _inside(point: Float, boundary: list[Float]) -> bool:
