@@ -85,7 +85,7 @@ def _missing_ports(mesh: FaceMesh, surface: SurfaceMesh, seed: Bool, touched: se
     out: list[int] = []
     for number, vertices in enumerate(surface.loops):
         component = int(surface.components[vertices[0]])
-        if number in touched or any(surface.components[v] == component for v in out) and component not in served:
+        if number in touched or (component not in served and any(surface.components[v] == component for v in out)):
             continue
         cad = vertices[mesh.vertex[vertices] >= 0]
         if not len(cad):

@@ -1,12 +1,13 @@
 """Patches of a planar map from its rotation system.
 
-Around every node the arcs are known in counter-clockwise order, with the number of quads between neighbours: 1 at a corner, 2 along
-a straight side, 0 for the outside.  Walking with the face on the left, a walk that arrives along an arc leaves along the next arc
-clockwise.  A patch has a corner at every single quad.
+Around every node the arcs are known in counter-clockwise order, with the number of quads between neighbours: 1 at a corner,
+2 along a straight side, 0 for the outside.  Walking with the face on the left, a walk that arrives along an arc leaves along
+the next arc clockwise.  A patch has a corner at every single quad.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from ..errors import LayoutError
@@ -63,9 +64,9 @@ def _sides(walk: list[tuple[Half, int]], location: Float) -> tuple[tuple[Half, .
     if len(corners) != 4:
         raise LayoutError(
             f"a patch of the layout has {len(corners)} corners instead of 4",
-            location=location,
+            location=location.tolist(),
             remedy="another size, or a finer background mesh, may help",
         )
     turned = [half for half, _ in walk[corners[-1] + 1 :] + walk[: corners[-1] + 1]]
     ends = [0, *((c - corners[-1]) % len(walk) or len(walk) for c in corners)]
-    return tuple(tuple(turned[a:b]) for a, b in zip(ends, ends[1:]))
+    return tuple(tuple(turned[a:b]) for a, b in itertools.pairwise(ends))

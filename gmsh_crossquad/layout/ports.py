@@ -72,7 +72,9 @@ def fan(mesh: TraceMesh, h: int, index: int) -> Fan:
         )
     polar, branch, offset = _develop(mesh, star)
     total = polar[-1]
-    if round((offset[-1] - offset[0]) / QUARTER) != -count:
+    last = previous_of(star[-1])
+    seen = mesh.wall[last] + 2 - branch[-1] if boundary else branch[0] - branch[-1] - mesh.shift[last]
+    if (seen - count) % 4 != 0:
         raise LayoutError(
             f"the field does not have index {index}/4 at this vertex", location=where, remedy="align the field first"
         )
@@ -94,7 +96,7 @@ def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], 
     -------
     polar : angle of every spoke, and of the last one's end
     branch : branch of the tracked direction in every triangle (0 in the first; at the boundary along the first spoke)
-    offset : tracked direction minus the spoke's angle at the middle of every spoke, and at the last
+    offset : tracked direction minus the spoke's angle at the middle of every spoke
     """
     polar, branch, offset = [0.0], [max(mesh.wall[star[0]], 0)], []
     direction = 0.0
@@ -111,7 +113,6 @@ def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], 
         offset.append(own + 2.0 * pi * turns - polar[i])
         direction = own + 2.0 * pi * turns + 0.5 * (mesh.value[p] - mesh.value[n])
         polar.append(polar[i] + corner)
-    offset.append(direction - polar[-1])
     return polar, branch, offset
 
 
@@ -156,10 +157,10 @@ def _place(
 
 
 def _aside(mesh: TraceMesh, rim: int, branch: int, s: float) -> int:
-    """0 if a branch may cross a rim edge, else +1 or -1: the way around the seed to an edge beside it.
+    """0 if a branch may cross a rim edge, else the way around the seed to an edge beside it, +1 or -1.
 
-    A boundary edge is only left straight outwards.  An edge that ends at the boundary is not crossed against the direction in which
-    the branch passes that end; it has to pass on the other side of it.
+    A boundary edge is only left straight outwards.  An edge that ends at the boundary is not crossed against the direction in
+    which the branch passes that end; it has to pass on the other side of it.
     """
     if mesh.gate[rim] >> branch % 4 & 1:
         return 0

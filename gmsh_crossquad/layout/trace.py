@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from math import hypot
 from typing import NamedTuple
@@ -45,6 +46,11 @@ NUDGE = ONE >> 14
 
 TRIES = 16
 """Bound on the attempts to find a free place."""
+
+RETREATS = 64
+"""Bound on the ways that one trace finds closed."""
+
+NONE: frozenset[int] = frozenset()
 
 
 class Chord(NamedTuple):
@@ -133,6 +139,8 @@ class _Growth:
         self.traces: list[Trace] = []
         self.chords: list[list[Chord]] = [[] for _ in range(len(mesh.start) // 3)]
         self.taken: set[int] = set()
+        self.hosting: set[tuple[int, int]] = set()
+        self.closed: dict[int, set[int]] = {}
 
     def run(self, seeds: Sequence[tuple[int, Fan]]) -> list[Trace]:
         heap: list[tuple[float, int, int, int, int]] = []
@@ -164,36 +172,60 @@ class _Growth:
         return self._record(trace, t, chord, mesh.x[3 * t + corner], mesh.y[3 * t + corner], 0.0)
 
     def _advance(self, length: float, i: int, h: int, place: int, branch: int) -> tuple[float, int, int, int, int] | None:
-        """Cross one triangle; returns the next state, or None at the end of the trace."""
-        mesh = self.mesh
+        """Cross one triangle; returns the next state, or None at the end of the trace.
+
+        Where there is no way on, the trace takes back its last chord and never leaves a triangle that way again.
+        """
         trace = self.traces[i]
         if len(trace.crossings) > self.max_steps:
             raise LayoutError(
                 "a separatrix does not end",
-                location=mesh.point(h, place / ONE),
+                location=self.mesh.point(h, place / ONE),
                 remedy="add a block corner or change the singularities",
             )
-        t, k = divmod(h, 3)
-        a = k * ONE + place
-        out, s = ideal_exit(mesh, h, place / ONE, branch)
+        while True:
+            t, k = divmod(h, 3)
+            a = k * ONE + place
+            b, host = self._exit(i, h, a, branch)
+            if b >= 0:
+                break
+            closed = self.closed.setdefault(i, set())
+            if len(trace.crossings) < 2 or (i, len(trace.crossings) - 1) in self.hosting or len(closed) > RETREATS:
+                raise self._stuck(t)
+            way, _ = trace.crossings.pop()
+            closed.add(way)
+            own = self.chords[way // 3]
+            chord = next(c for c in reversed(own) if c.trace == i)
+            own.remove(chord)
+            k, place = divmod(chord.a, ONE)
+            h, branch = way - way % 3 + k, chord.branch
+        chord = Chord(a, b, branch, i, len(trace.crossings), host)
+        x, y = self.mesh.x[h] + place / ONE * self.mesh.ex[h], self.mesh.y[h] + place / ONE * self.mesh.ey[h]
+        state = self._record(trace, t, chord, x, y, length)
+        return state if state[2] >= 0 else None
+
+    def _exit(self, i: int, h: int, a: int, branch: int) -> tuple[int, Chord | None]:
+        """Exit for trace `i` that entered at `a` on half-edge `h`, and the chord that it meets before; -1 if there is no exit."""
+        mesh = self.mesh
+        t = h // 3
+        closed = self.closed.get(i, NONE)
+        chords = self.chords[t]
+        out, s = ideal_exit(mesh, h, a % ONE / ONE, branch)
         if mesh.wall[out] >= 0 and not mesh.gate[out] >> branch & 1:
             out, s = self._slide(h, out, s, (branch - mesh.wall[out]) % 4)
         b = (out - 3 * t) * ONE + int(s * ONE)
-        chords = self.chords[t]
         for _ in range(TRIES):
+            out = 3 * t + b // ONE
             host, blocked = self._meet(chords, a, b, branch)
-            if blocked or not mesh.gate[3 * t + b // ONE] >> branch & 1:
-                b = self._beside(t, chords, a, b, branch)
-            elif self._take(3 * t + b // ONE, b % ONE):
-                break
+            if blocked or not mesh.gate[out] >> branch & 1 or out in closed:
+                b = self._beside(t, chords, a, b, branch, closed)
+                if b < 0:
+                    return -1, None
+            elif self._take(out, b % ONE):
+                return b, host
             else:
                 b += NUDGE if b % ONE < ONE // 2 else -NUDGE
-        else:
-            raise self._stuck(t)
-        chord = Chord(a, b, branch, i, len(trace.crossings), host)
-        x, y = mesh.x[h] + place / ONE * mesh.ex[h], mesh.y[h] + place / ONE * mesh.ey[h]
-        state = self._record(trace, t, chord, x, y, length)
-        return state if state[2] >= 0 else None
+        return -1, None
 
     def _record(self, trace: Trace, t: int, chord: Chord, x: float, y: float, length: float) -> tuple[float, int, int, int, int]:
         """Add a chord that starts at (x, y) to its trace; returns the next state, its half-edge -1 at the end of the trace."""
@@ -205,6 +237,7 @@ class _Growth:
         trace.last = chord
         trace.crossings.append((q, place))
         if chord.host is not None:
+            self.hosting.add((chord.host.trace, chord.host.segment))
             trace.host = chord.host
             trace.across, trace.along = self._intersect(t, x, y, dx, dy, chord.host)
             return length, chord.trace, -1, 0, 0
@@ -237,17 +270,18 @@ class _Growth:
                 first, nearest = chord, min(xp, xq)
         return first, False
 
-    def _beside(self, t: int, chords: list[Chord], a: int, b: int, branch: int) -> int:
-        """The allowed exit nearest to `b`.
+    def _beside(self, t: int, chords: list[Chord], a: int, b: int, branch: int, closed: AbstractSet[int]) -> int:
+        """The allowed exit nearest to `b`, or -1.
 
-        Places are measured counter-clockwise from `a`; every chord that must not be crossed forbids the part of the rim behind it.
+        Places are measured counter-clockwise from `a`; every chord that must not be crossed forbids the rim behind it.
         """
         mesh = self.mesh
         k = a // ONE
         corner = (k + 1) * ONE - a
         forbidden = [(0, corner), (corner + ONE, corner + ONE), (corner + 2 * ONE, AROUND)]
         for m in (1, 2):
-            if not mesh.gate[3 * t + (k + m) % 3] >> branch & 1:
+            out = 3 * t + (k + m) % 3
+            if not mesh.gate[out] >> branch & 1 or out in closed:
                 forbidden.append((corner + (m - 1) * ONE, corner + m * ONE))
         for p, q, other, _, _, host in chords:
             if host is not None and on_left(host, a) != on_left(host, p):
@@ -267,9 +301,7 @@ class _Growth:
                 if abs(x - wanted) < distance:
                     best, distance = x, abs(x - wanted)
             reach = max(reach, high)
-        if best < 0:
-            raise self._stuck(t)
-        return (a + best) % AROUND
+        return (a + best) % AROUND if best >= 0 else -1
 
     def _take(self, h: int, place: int) -> bool:
         """Take a place on an edge; False if somebody has it."""

@@ -236,8 +236,8 @@ def _guard_boundary(mesh: TraceMesh, seeds: set[int]) -> None:
 def _prepare(mesh: TraceMesh) -> None:
     """Edge vectors, the linear function of every triangle, and vertices on the boundary."""
     mesh.on_boundary = [False] * len(mesh.points)
-    for v, wall in zip(mesh.start, mesh.wall):
-        mesh.on_boundary[v] |= wall >= 0
+    for start, wall in zip(mesh.start, mesh.wall):
+        mesh.on_boundary[start] |= wall >= 0
     x, y, v = (np.array(a).reshape(-1, 3) for a in (mesh.x, mesh.y, mesh.value))
     ex, ey = np.roll(x, -1, axis=1) - x, np.roll(y, -1, axis=1) - y
     length = np.hypot(ex, ey)
