@@ -195,7 +195,12 @@ def _near(polylines: Sequence[Float], start: Float, stop: Float, curve: Int, i: 
     """Segments without a common node whose curves touch."""
     hit = np.zeros(len(i), bool)
     where = np.zeros((len(i), 2))
-    close = np.flatnonzero(_separation(start[i], stop[i], start[j], stop[j]) <= CLOSE)
+    gap = _separation(start[i], stop[i], start[j], stop[j])
+    straight = np.array([_straight(p) for p in polylines])
+    exact = straight[curve[i]] & straight[curve[j]]
+    hit[exact] = gap[exact] <= TOUCH
+    where[exact] = _meeting(start[i[exact]], stop[i[exact]], start[j[exact]], stop[j[exact]])
+    close = np.flatnonzero(~exact & (gap <= CLOSE))
     offset = np.searchsorted(curve, np.arange(len(polylines)))
     step = BLOCK // FINE**2
     for begin in range(0, len(close), step):
@@ -208,6 +213,13 @@ def _near(polylines: Sequence[Float], start: Float, stop: Float, curve: Int, i: 
         k, m, n = np.arange(len(block)), best // FINE, best % FINE
         where[block] = _meeting(one[k, m], one[k, m + 1], two[k, n], two[k, n + 1])
     return hit, where
+
+
+def _straight(p: Float) -> bool:
+    """Whether a polyline is a straight line, so that its segments are exact."""
+    away = p - p[0]
+    far = away[np.argmax((away**2).sum(1))]
+    return bool(np.abs(_cross(away, far)).max() <= 1e-15)
 
 
 def _cubics(polylines: Sequence[Float], curve: Int, row: Int) -> Float:

@@ -155,14 +155,27 @@ def _check_embedded(model: Model, face: Face, flat: dict[int, Float]) -> None:
         if not _inside(middle, boundary):
             place = _user(model, curve.points[len(curve.points) // 2])
             raise GeometryError("the embedded curve is outside its surface", entity=(1, curve.tag), location=place)
-    for v in face.embedded_points:
-        point = face.local(model.vertices[v][None])[0]
-        off_plane = abs(float((model.vertices[v] - face.origin) @ np.cross(face.axes[0], face.axes[1])))
-        if off_plane > 1e-6 or not _inside(point, boundary):
-            place = _user(model, model.vertices[v])
-            raise GeometryError(
-                "the embedded point is outside its surface", entity=(0, int(model.vertex_tags[v])), location=place
-            )
+    for k, v in enumerate(face.embedded_points):
+        wrong = _misplaced(model, face, flat, boundary, face.embedded_points[:k], v)
+        if wrong:
+            tag, place = int(model.vertex_tags[v]), _user(model, model.vertices[v])
+            raise GeometryError(f"the embedded point {wrong}", entity=(0, tag), location=place, remedy="move or remove it")
+
+
+def _misplaced(
+    model: Model, face: Face, flat: dict[int, Float], boundary: list[Float], before: tuple[int, ...], vertex: int
+) -> str:
+    """What is wrong with an embedded point, empty where nothing is."""
+    place = model.vertices[vertex]
+    point = face.local(place[None])[0]
+    for w in before:
+        if np.linalg.norm(place - model.vertices[w]) <= SAME:
+            return f"coincides with point {model.vertex_tags[w]}"
+    for c, line in flat.items():
+        if _distance(point, line) <= ON_CURVE:
+            return f"lies on curve {model.curves[c].tag} without being a point of it"
+    off_plane = abs(float((place - face.origin) @ np.cross(face.axes[0], face.axes[1])))
+    return "" if off_plane <= ON_CURVE and _inside(point, boundary) else "is outside its surface"
 
 
 def _distance(point: Float, line: Float) -> float:
