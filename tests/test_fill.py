@@ -137,6 +137,16 @@ def test_parameters_keep_guide_vertices_and_order() -> None:
     assert np.all(np.diff(t) > 0)
 
 
+def test_even_steps_between_guide_vertices() -> None:
+    curve = models.square(2.0).curves[0]
+    s = curve.length * np.array([0.0, 0.1, 0.9, 1.0])
+    t = curve_parameters(curve, s, np.array([2, 4, 2]), np.array([1.0, 1.0, 0.0]))
+    smooth = curve_parameters(curve, s, np.array([2, 4, 2]))
+    np.testing.assert_allclose(t[:7], [0, 0.05, 0.1, 0.3, 0.5, 0.7, 0.9], atol=1e-12)
+    np.testing.assert_allclose(t[6:], smooth[6:], atol=1e-12)
+    assert smooth[3] - smooth[2] < 0.2  # grows from the smaller step before
+
+
 def test_transfinite_spacing_is_kept() -> None:
     curve = models.square().curves[0]
     curve = replace(curve, spacing=curve.length * np.array([0, 0.1, 0.3, 0.6, 1.0]))
@@ -460,6 +470,20 @@ def test_cells_beside_bulging_edges_do_not_fold(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(pipeline, "ROUNDS", 0)
     with pytest.raises(MeshError, match="fold"):
         fill(model, guide, uniform(guide, 8), straight(model))
+
+
+def test_sides_of_a_thin_cell_do_not_shear_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    # the bottom breaks at x = .02 and is even beyond; the line close above it runs on there and grows
+    corners = [(0, 0), (0.02, 0), (1, 0), (1, 1), (0, 1)]
+    model = models.polygon(corners)
+    xy = [*corners, (0.02, 1), (0, 0.003), (0.02, 0.003), (1, 0.003)]
+    quads = [(0, 1, 7, 6), (1, 2, 8, 7), (6, 7, 5, 4), (7, 8, 3, 5)]
+    guide = make_guide(model, xy, quads, [(0, 1), (1, 2), (2, 8, 3), (3, 5, 4), (4, 6, 0)])
+    mesh = fill(model, guide, uniform(guide, 16), straight(model))
+    assert scaled_jacobian(mesh.points, mesh.quads, UP).min() > 0.5
+    monkeypatch.setattr(pipeline, "ROUNDS", 0)
+    mesh = fill(model, guide, uniform(guide, 16), straight(model))
+    assert scaled_jacobian(mesh.points, mesh.quads, UP).min() < 0.3
 
 
 def bulge(height: float) -> tuple[Model, Guide, Callable[[int, Float], Float]]:

@@ -18,6 +18,7 @@ from .skeleton import Frames, Skeleton
 __all__ = ["Cells"]
 
 CHUNK = 1 << 14  # grid nodes at a time
+LONG = 64  # rows from which a slice is faster than an index array
 
 # corner where each side starts and ends when it runs with u or v
 SIDES = ((0, 1), (1, 2), (3, 2), (0, 3))
@@ -114,7 +115,8 @@ class Cells:
 def _put(target: Float | Int, first: Int, rows: Float | Int) -> None:
     """Write blocks of rows (m, k, d) to `target` at the rows that start at `first` (m,)."""
     k = rows.shape[1]
-    if np.all(np.diff(first) == k):
-        target[first[0] : first[0] + len(first) * k] = rows.reshape(-1, rows.shape[2])
+    if k >= LONG:
+        for start, block in zip(first.tolist(), rows):
+            target[start : start + k] = block
     else:
         target[first[:, None] + np.arange(k)] = rows

@@ -75,7 +75,7 @@ def _end_slope(h0: float, h1: float, s0: float, s1: float) -> float:
     return d
 
 
-def curve_parameters(curve: Curve, arclength: Float, divisions: Int) -> Float:
+def curve_parameters(curve: Curve, arclength: Float, divisions: Int, even: Float | None = None) -> Float:
     """CAD parameters of all nodes of a curve.
 
     Parameters
@@ -85,6 +85,8 @@ def curve_parameters(curve: Curve, arclength: Float, divisions: Int) -> Float:
         Arc lengths of the guide vertices, from 0 to the length of the curve.
     divisions : (k,) int64
         Pieces between consecutive guide vertices.
+    even : (k,) float64, optional
+        How far the nodes between guide vertices go from smooth growth (0, the default) to equal steps (1).
 
     Returns
     -------
@@ -109,11 +111,26 @@ def curve_parameters(curve: Curve, arclength: Float, divisions: Int) -> Float:
     else:
         if np.any(np.diff(arclength) <= 0):
             raise MeshError("guide vertices are not in order", entity=(1, curve.tag), remedy="use a smaller size")
-        s = monotone_cubic(index, arclength, nodes.astype(float), periodic=curve.closed)
-    apart = np.concatenate([[True], np.diff(curve.arclength) > 0])
-    out = monotone_cubic(curve.arclength[apart], curve.parameters[apart], np.minimum(s, curve.length))
+        s = arclength
+        if len(nodes) > len(arclength):
+            s = monotone_cubic(index, arclength, nodes.astype(float), periodic=curve.closed)
+            if even is not None and np.any(even > 0):
+                weight = np.repeat(even, divisions)
+                s[1:] += weight * (np.interp(nodes[1:], index, arclength) - s[1:])
+    out = _parameter(curve, s)
     out[0], out[-1] = curve.parameters[0], curve.parameters[-1]
     step = np.diff(out)
     if not (np.all(step > 0) or np.all(step < 0)):
         raise MeshError("nodes on a curve coincide", entity=(1, curve.tag), remedy="use a larger size")
     return out
+
+
+def _parameter(curve: Curve, s: Float) -> Float:
+    """CAD parameters (m,) at arc lengths (m,)."""
+    apart = np.flatnonzero(np.diff(curve.arclength) > 0)
+    known_s = np.concatenate([curve.arclength[:1], curve.arclength[apart + 1]])
+    known_t = np.concatenate([curve.parameters[:1], curve.parameters[apart + 1]])
+    slope = np.diff(known_t) / np.diff(known_s)
+    if slope.max() - slope.min() <= 1e-12 * abs(slope[0]):  # lines and circles need no cubic
+        return known_t[0] + slope[0] * s
+    return monotone_cubic(known_s, known_t, np.minimum(s, curve.length))

@@ -1,13 +1,15 @@
 """The final mesh from the smoothed guide grid.
 
 Curves first (exact CAD points, monotone spacing), then the inner guide edges (Hermite cubics), then all cells (Coons).  A
-cubic that bulges too much folds the cells beside it: where a fine quad is worse than half its guide quad, the edges of
-that cell are straightened step by step.  Only cells that touch a changed edge are computed again.
+cubic that bulges too much folds the cells beside it, and sides of a thin cell that grow differently shear it: where a fine
+quad is worse than half its guide quad, the edges of that cell are made straight and even step by step (on CAD curves, even
+only).  Only cells that touch a changed edge are computed again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,7 +23,7 @@ from .tangents import continuation, end_tangents
 
 __all__ = ["fill", "poor_cells"]
 
-ROUNDS = 6  # of straightening; each halves the bulge
+ROUNDS = 6  # of straightening; each halves the bulge and the unevenness
 KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
 POOR = 0.05  # guide quads below this are held to this
 
@@ -62,16 +64,17 @@ def fill(
     """
     if filler not in ("numpy", "gmsh"):
         raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
-    cells, points, parameters = _prepare(model, guide, divisions, evaluate, vertices)
+    work = _Work.start(model, guide, divisions, evaluate, vertices)
+    cells, points = work.cells, work.points
     own = cells.corner_quality()
-    _refuse_folds(model, guide, own, _place(cells, own, points))
+    _refuse_folds(model, guide, own, work.place(own))
     if filler == "gmsh":
         from .gmsh_fill import gmsh_cells
 
         for q, inside in enumerate(gmsh_cells(guide.quads, cells.topology, cells.skeleton)):
             first = cells.numbering.cell_first[q]
             points[first : first + len(inside)] = inside * model.scale + model.origin
-    return _record(guide, cells, points, parameters, int(np.count_nonzero(own <= 0)))
+    return _record(guide, cells, points, tuple(work.parameters), int(np.count_nonzero(own <= 0)))
 
 
 def poor_cells(
@@ -90,62 +93,87 @@ def poor_cells(
         Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
         inner edges were straightened.
     """
-    cells, points, _ = _prepare(model, guide, divisions, evaluate, vertices)
-    own = cells.corner_quality()
-    out: Int = np.flatnonzero(_place(cells, own, points) < KEEP * np.maximum(own, POOR))
+    work = _Work.start(model, guide, divisions, evaluate, vertices)
+    own = work.cells.corner_quality()
+    out: Int = np.flatnonzero(work.place(own) < KEEP * np.maximum(own, POOR))
     return out
 
 
-def _prepare(
-    model: Model, guide: Guide, divisions: Int, evaluate: Callable[[int, Float], Float], vertices: Float | None
-) -> tuple[Cells, Float, tuple[Float, ...]]:
-    """Number the nodes and place those on curves; cells, points and the parameters of every curve's nodes."""
-    edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
-    if len(divisions) != n_chords:
-        raise MeshError(f"{len(divisions)} divisions for {n_chords} guide chords", remedy="report this model")
-    topology = guide_topology(guide, edges, quad_edges)
-    pieces = np.asarray(divisions, np.int64)[chord]
-    numbering = number(guide, topology, pieces, len(model.vertices), len(model.faces))
-    skeleton = Skeleton.start(guide, pieces)
-    points = np.empty((numbering.n_nodes, 3))
-    used = numbering.vertex_node >= 0
-    exact = model.vertices * model.scale + model.origin if vertices is None else vertices
-    points[numbering.vertex_node[used]] = exact[used]
-    parameters = []
-    for row, (chain, e, forward) in enumerate(zip(guide.chains, topology.chain_edges, topology.chain_forward)):
-        curve, nodes = model.curves[row], numbering.curve_nodes[row]
-        s = guide.arclength[chain]
+@dataclass(frozen=True)
+class _Work:
+    """A mesh in the making; `points`, `parameters` and the positions in `cells.skeleton` are filled in place."""
+
+    model: Model
+    cells: Cells
+    evaluate: Callable[[int, Float], Float]
+    points: Float
+    parameters: list[Float]
+
+    @classmethod
+    def start(
+        cls,
+        model: Model,
+        guide: Guide,
+        divisions: Int,
+        evaluate: Callable[[int, Float], Float],
+        vertices: Float | None,
+    ) -> _Work:
+        """Number all nodes and place those on CAD vertices."""
+        edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
+        if len(divisions) != n_chords:
+            raise MeshError(f"{len(divisions)} divisions for {n_chords} guide chords", remedy="report this model")
+        topology = guide_topology(guide, edges, quad_edges)
+        pieces = np.asarray(divisions, np.int64)[chord]
+        numbering = number(guide, topology, pieces, len(model.vertices), len(model.faces))
+        points = np.empty((numbering.n_nodes, 3))
+        used = numbering.vertex_node >= 0
+        exact = model.vertices * model.scale + model.origin if vertices is None else vertices
+        points[numbering.vertex_node[used]] = exact[used]
+        cells = Cells(guide, topology, numbering, Skeleton.start(guide, pieces), Frames.of(model))
+        work = cls(model, cells, evaluate, points, [np.empty(0)] * len(guide.chains))
+        for row in range(len(guide.chains)):
+            work.put_curve(row, np.zeros(len(edges)))
+        return work
+
+    def put_curve(self, row: int, even: Float) -> None:
+        """Place the nodes of a CAD curve; `even` (e,) as in `curve_parameters`, per guide edge."""
+        cells, model = self.cells, self.model
+        curve, chain, nodes = model.curves[row], cells.guide.chains[row], cells.numbering.curve_nodes[row]
+        e = cells.topology.chain_edges[row]
+        s = cells.guide.arclength[chain]
         s[0], s[-1] = 0.0, curve.length
-        t = curve_parameters(curve, s, pieces[e])
+        t = curve_parameters(curve, s, cells.numbering.divisions[e], even[e])
         if len(t) > 2:
-            points[nodes[1:-1]] = evaluate(row, t[1:-1])
-        parameters.append(t)
-        skeleton.put_chain(chain, e, forward, (points[nodes] - model.origin) / model.scale)
-    return Cells(guide, topology, numbering, skeleton, Frames.of(model)), points, tuple(parameters)
+            self.points[nodes[1:-1]] = self.evaluate(row, t[1:-1])
+        self.parameters[row] = t
+        cells.skeleton.put_chain(chain, e, cells.topology.chain_forward[row], (self.points[nodes] - model.origin) / model.scale)
 
-
-def _place(cells: Cells, own: Float, points: Float) -> Float:
-    """Place all that is inside faces, straightening edges beside bad cells; the least scaled Jacobian (q,) of every cell."""
-    topology, skeleton = cells.topology, cells.skeleton
-    edges, quad_edges = topology.edges, topology.quad_edges
-    inner = np.flatnonzero(~topology.on_curve)
-    tangents = end_tangents(skeleton.vertices, edges, skeleton.divisions, continuation(cells.guide.quads, topology))
-    skeleton.put_cubics(inner, edges, tangents)
-    worst = cells.place(np.arange(len(quad_edges)), points)
-    free = ~topology.on_curve & (skeleton.divisions > 1)
-    for _ in range(ROUNDS):
-        soft: Bool = np.zeros(len(edges), bool)
-        soft[quad_edges[worst < KEEP * np.maximum(own, POOR)]] = True
-        e = np.flatnonzero(soft & free)
-        if len(e) == 0:
-            break
-        chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
-        tangents[e] = 0.5 * (tangents[e] + chord[:, None])
-        skeleton.put_cubics(e, edges, tangents)
-        again = np.flatnonzero(np.any((soft & free)[quad_edges], axis=1))
-        worst[again] = cells.place(again, points)
-    skeleton.write(points, cells.guide, cells.numbering, topology, cells.frames)
-    return worst
+    def place(self, own: Float) -> Float:
+        """Place all that is inside faces, straightening the edges of bad cells; the least scaled Jacobian of every cell."""
+        cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
+        edges, quad_edges = topology.edges, topology.quad_edges
+        tangents = end_tangents(skeleton.vertices, edges, skeleton.divisions, continuation(cells.guide.quads, topology))
+        skeleton.put_cubics(np.flatnonzero(~topology.on_curve), edges, tangents)
+        worst = cells.place(np.arange(len(quad_edges)), self.points)
+        even = np.zeros(len(edges))
+        for _ in range(ROUNDS):
+            soft: Bool = np.zeros(len(edges), bool)
+            soft[quad_edges[worst < KEEP * np.maximum(own, POOR)]] = True
+            soft &= skeleton.divisions > 1
+            if not np.any(soft):
+                break
+            even[soft] += 0.5 * (1.0 - even[soft])
+            for row, e in enumerate(topology.chain_edges):
+                if np.any(soft[e]):
+                    self.put_curve(row, even)
+            e = np.flatnonzero(soft & ~topology.on_curve)
+            chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
+            tangents[e] = 0.5 * (tangents[e] + chord[:, None])
+            skeleton.put_cubics(e, edges, tangents)
+            again = np.flatnonzero(np.any(soft[quad_edges], axis=1))
+            worst[again] = cells.place(again, self.points)
+        skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)
+        return worst
 
 
 def _refuse_folds(model: Model, guide: Guide, own: Float, worst: Float) -> None:
