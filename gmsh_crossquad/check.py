@@ -71,7 +71,7 @@ def _jacobians(points: Float, cells: Int, entity: Int) -> Float:
     if cells.shape[1] == 3:
         area = 0.5 * np.cross(points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, 2]] - points[cells[:, 0]])
     _, row = np.unique(entity, return_inverse=True)
-    total = np.stack([np.bincount(row, area[:, c]) for c in range(3)], axis=1)
+    total: Float = np.stack([np.bincount(row, area[:, c]) for c in range(3)], axis=1).astype(np.float64)
     size = np.linalg.norm(area, axis=1)
     normal = _unit(total)[row]
     length = np.linalg.norm(total, axis=1)[row]
@@ -222,7 +222,7 @@ def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[i
     points = (mesh.points - model.origin) / model.scale
     tree = cKDTree(points[used])
     wanted = np.flatnonzero(model.vertex_tags >= 0)
-    missed = int((tree.query(model.vertices[wanted])[0] > _TOUCH).sum())
+    missed = int(np.count_nonzero(np.asarray(tree.query(model.vertices[wanted])[0]) > _TOUCH))
     if missed:
         faults.append(f"{missed} CAD vertices are no nodes")
     loose = _loose_edges(points, _free_edges(mesh), model)
@@ -270,7 +270,7 @@ def _loose_edges(points: Float, edges: Int, model: Model) -> int:
     ends = np.unique(edges)
     on = np.zeros(len(points), bool)
     on[ends] = _distance(points[ends], a, b) < 1e-5
-    return int((~on[edges].all(axis=1)).sum())
+    return int(np.count_nonzero(~on[edges].all(axis=1)))
 
 
 def _distance(points: Float, a: Float, b: Float) -> Float:

@@ -38,10 +38,10 @@ def draw(scene: Scene, path: str) -> None:
         corners = panel.points[panel.cells]
         order = np.argsort(corners[:, :, 2].mean(axis=1), kind="stable")
         fill = panel.colours[order] / 255
-        ax.add_collection(PolyCollection(corners[order][:, :, :2], facecolors=fill, edgecolors=fill, linewidths=0.2))
+        ax.add_collection(PolyCollection(list(corners[order][:, :, :2]), facecolors=fill, edgecolors=fill, linewidths=0.2))
         for lines in panel.lines:
             colour = tuple(c / 255 for c in lines.colour)
-            ax.add_collection(LineCollection(lines.segments[:, :, :2], colors=[colour], linewidths=lines.width))
+            ax.add_collection(LineCollection(list(lines.segments[:, :, :2]), colors=[colour], linewidths=lines.width))
         for markers in panel.markers:
             colour = tuple(c / 255 for c in markers.colour)
             x, y = markers.points[:, :2].T
