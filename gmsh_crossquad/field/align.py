@@ -4,8 +4,8 @@ The aligned field is ``theta + x`` with one unknown x per edge.  Along a boundar
 vertex v by ``K_v - (pi/2) q_v`` (K_v = pi minus the angle, q_v the wanted index); summed over the loop this must equal what
 the field does:
 
-1. The *defect* ``D_i = target_i - degree_i`` (quarter turns) of a loop vanishes after moving D_i quarter turns of index along
-   a path from the outer loop to the hole (an integer cocycle in `rotation`).  All defects of a component add up to 0, or the
+1. The *defect* ``D_i = target_i - degree_i`` (quarter turns) of a hole vanishes after moving D_i quarter turns of index along a
+   path from it to the outer loop (an integer cocycle in `rotation`).  All defects of a component add up to 0, or the
    wanted indices contradict Poincaré–Hopf.
 2. x is then known on every boundary edge up to one constant per loop, a multiple ``m_i pi/2`` (0 on the outer loop), and
    inside it minimises ``1/2 sum w (difference(x) + rotation)^2``.
@@ -111,7 +111,7 @@ class Aligner:
                 raise LayoutError(
                     "no path of edges leads from a hole to the outer boundary", remedy="use a finer background mesh"
                 )
-            move_index(self.mesh, out, path, -int(defect[i]))
+            move_index(self.mesh, out, path, int(defect[i]))
         return out
 
     def solve(self, theta: Float, closed: Float) -> Float:

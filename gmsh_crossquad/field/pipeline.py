@@ -42,7 +42,7 @@ def aligned_field(mesh: FaceMesh, field: CrossField | None = None, boundary_inde
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
     if field is not None:
-        return align(surface, operators, CrossField(field.theta, snap_to_vertices(surface, field.rotation, mesh.port)), wanted)
+        return align(surface, operators, CrossField(field.theta, snap_to_vertices(surface, field.rotation)), wanted)
 
     aligner = Aligner(surface, operators, wanted)
     smooth = smooth_field(surface, operators)

@@ -145,7 +145,8 @@ def snap_to_vertices(mesh: SurfaceMesh, rotation: Float, avoid: Bool | None = No
     """Move the index of every singular triangle to one of its interior vertices.
 
     Preferred is a vertex whose index is cancelled by it, then one that is not in `avoid`, then the corner through which the
-    cross turns most (there the move lowers the energy most).
+    cross turns most (there the move lowers the energy most).  An index that is already at a vertex of `avoid` goes to a regular
+    neighbour.
 
     Parameters
     ----------
@@ -174,4 +175,9 @@ def snap_to_vertices(mesh: SurfaceMesh, rotation: Float, avoid: Bool | None = No
         k = max(corners, key=preference)
         out[t, (k + 2) % 3] -= q * QUARTER
         at_vertex[mesh.triangles[t, k]] += q
+    for v in np.flatnonzero((at_vertex != 0) & avoid) if avoid is not None else ():
+        free = [w for w in mesh.neighbours(int(v)) if not (mesh.boundary_vertex[w] or avoid[w] or at_vertex[w])]
+        if free:
+            move_index(mesh, out, [int(v), free[0]], int(at_vertex[v]))
+            at_vertex[free[0]], at_vertex[v] = at_vertex[v], 0
     return out
