@@ -250,11 +250,11 @@ def moved(model: Model, angle: float) -> Model:
 
 def background(model: Model, h: float = 0.03) -> tuple[FaceMesh, ...]:
     """Uniform background meshes of edge length `h` (scaled); needs Gmsh."""
-    from gmsh_crossquad.cad.background import face_mesh
+    from gmsh_crossquad.cad.background import face_meshes
     from gmsh_crossquad.cad.session import guest
 
     spacing = tuple(
         np.linspace(0.0, c.length, max(12 if c.closed else 3, int(np.ceil(c.length / h - 1e-9))) + 1) for c in model.curves
     )
     with guest():
-        return tuple(face_mesh(model, row, spacing, h) for row in range(len(model.faces)))
+        return face_meshes(model, spacing, np.full(len(model.faces), h))

@@ -16,12 +16,13 @@ from ..field.split import open_up
 from ..field.surface_mesh import SurfaceMesh
 from ..options import MeshOptions
 from ..records import FaceMesh, Float, Int, Model
+from . import session
 from .outline import Outline, outline
 from .spacing import curve_spacing, face_sizes
 from .tangents import end_directions
-from .triangulate import triangulate
+from .triangulate import OPTIONS, triangulate
 
-__all__ = ["background_meshes", "face_mesh"]
+__all__ = ["background_meshes", "face_meshes"]
 
 
 def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...]:
@@ -43,47 +44,75 @@ def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...
     MeshError
         Where a face cannot be triangulated.
     """
-    spacing = curve_spacing(model, options)
     sizes = face_sizes(model, options)
-    return tuple(face_mesh(model, row, spacing, float(sizes[row])) for row in range(len(model.faces)))
+    return face_meshes(model, curve_spacing(model, options, sizes), sizes)
 
 
-def face_mesh(model: Model, row: int, spacing: tuple[Float, ...], h_max: float) -> FaceMesh:
-    """Background mesh of one face.
+def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple[FaceMesh, ...]:
+    """Background meshes of all faces from given nodes on the curves.
 
     Parameters
     ----------
     model : Model
-    row : int
-        Row of the face.
     spacing : tuple of (k + 1,) float64
         Arc lengths of the nodes of every curve.
-    h_max : float
-        Greatest size of triangles.
+    sizes : (f,) float64
+        Greatest size of triangles in every face.
 
     Raises
     ------
     MeshError
-        Where the face cannot be triangulated.
+        Where a face cannot be triangulated.
     """
-    shape = outline(model, row, spacing)
-    points, triangles = triangulate(shape, h_max, model.faces[row].tag)
-    triangles, source = cut_open(triangles, len(points), shape.segments[shape.embedded])
-    points = points[source]
-    vertex = np.where(source < len(shape.vertex), shape.vertex[np.minimum(source, len(shape.vertex) - 1)], -1)
-    on_boundary = SurfaceMesh(points, triangles).boundary_vertex
-    points, triangles = open_up(points, triangles, on_boundary & (vertex >= 0))
-    new = len(points) - len(source)
-    source, vertex = (np.concatenate([a, np.full(new, -1)]) for a in (source, vertex))
-    mesh = SurfaceMesh(points, triangles)
+    shapes = [outline(model, row, spacing) for row in range(len(model.faces))]
+    with session.options(**OPTIONS):
+        made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
+    # everything that follows is done for all faces together
+    offset = np.concatenate([[0], np.cumsum([len(p) for p, _ in made])])
+    points = np.concatenate([p for p, _ in made])
+    triangles = np.concatenate([t + o for (_, t), o in zip(made, offset)])
+    cuts = np.concatenate([shape.segments[shape.embedded] + o for shape, o in zip(shapes, offset)])
+    vertex = np.full(len(points), -1)
+    for shape, o in zip(shapes, offset):
+        vertex[o : o + len(shape.vertex)] = shape.vertex
+    triangles, source = cut_open(triangles, len(points), cuts)
+    on_boundary = SurfaceMesh(points[source], triangles).boundary_vertex
+    points, triangles = open_up(points[source], triangles, on_boundary & (vertex[source] >= 0))
+    source = np.concatenate([source, np.full(len(points) - len(source), -1)])
+    owner = np.full(len(points), -1)
+    old = source >= 0
+    owner[old] = np.searchsorted(offset, source[old], side="right") - 1
+    triangle_owner = owner[triangles].max(axis=1)
+    while (triangle_owner < 0).any():  # new points belong to the face of their triangles; each round reaches the next ones
+        known = triangle_owner >= 0
+        owner[triangles[known]] = triangle_owner[known, None]
+        triangle_owner = owner[triangles].max(axis=1)
+    owner[triangles] = triangle_owner[:, None]
+    out = []
+    order = np.argsort(owner, kind="stable")
+    local = np.empty(len(points), np.int64)
+    bounds = np.searchsorted(owner[order], np.arange(len(shapes) + 1))
+    for row, shape in enumerate(shapes):
+        mine = order[bounds[row] : bounds[row + 1]]
+        local[mine] = np.arange(len(mine))
+        inside = np.where(source[mine] >= 0, source[mine] - offset[row], -1)
+        mesh = SurfaceMesh(points[mine], local[triangles[triangle_owner == row]])
+        out.append(_face_mesh(model, row, shape, mesh, inside))
+    return tuple(out)
+
+
+def _face_mesh(model: Model, row: int, shape: Outline, mesh: SurfaceMesh, source: Int) -> FaceMesh:
+    """The record of one face; `source` are the points of the triangulation that its points came from, or -1."""
+    known = (source >= 0) & (source < len(shape.vertex))
+    vertex = np.where(known, shape.vertex[np.where(known, source, 0)], -1)
     boundary, curve, arclength = _boundary(mesh, shape, source, model.faces[row].tag)
     angle = _opening_angles(model, row, mesh, boundary, curve, arclength, vertex)
     asked = (vertex >= 0) & model.vertex_ports[np.maximum(vertex, 0)]
     smooth = np.abs(angle - np.pi) < np.pi / 4
     return FaceMesh(
         face=row,
-        points=points,
-        triangles=triangles,
+        points=mesh.points,
+        triangles=mesh.triangles,
         boundary=boundary,
         boundary_curve=curve,
         boundary_arclength=arclength,

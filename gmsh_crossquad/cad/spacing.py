@@ -23,18 +23,21 @@ from .gaps import Neighbours, Uses, neighbours
 
 __all__ = ["curve_spacing", "face_sizes"]
 
-DIVISIONS = 40.0  # of a face's diameter
+DIVISIONS, FEW_DIVISIONS = 40.0, 16.0  # of a face's diameter in a model of up to MANY faces, and of very many
+MANY = 10
 TRIANGLES, FACE_TRIANGLES = 3000.0, 100.0  # wanted in the model, and at least in a face, where there are many
 GROWTH = 0.3
-TURN, TURN_SMALL = np.radians(12.0), np.radians(18.0)  # per segment: usually, and where segments are small anyway
+TURN, TURN_SMALL = np.radians(12.0), np.radians(22.5)  # per segment: usually, and where segments are small anyway
 SMALL_TURN = 0.004  # least spacing because of turning, over that elsewhere
 GAP = 0.5  # spacing over gap
 CORNER = 0.5  # spacing at sharp and re-entrant corners over that elsewhere
 TIP = 0.35
 SHARP, REENTRANT = np.radians(60.0), np.radians(200.0)
 ROUNDS = 6
-MAX_CELLS = 20_000
-MAX_NODES = 6_000
+WANTED_NODES, MAX_NODES = 2_000.0, 5_000.0  # beyond the least numbers of the curves
+WIDE_GAP = 2.0  # spacing over gap that is accepted to have no more than the wanted nodes
+SHORT = 0.4  # length over face size of a curve that may be a single segment
+STRAIGHT = np.radians(25.0)  # greatest bend at its ends
 SMALLEST = 1e-7  # of the model
 
 
@@ -53,6 +56,7 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
     (f,) float64, scaled
     """
     out = np.zeros(len(model.faces))
+    divisions = max(FEW_DIVISIONS, DIVISIONS * min(1.0, float(np.sqrt(MANY / max(1, len(model.faces))))))
     wanted = max(FACE_TRIANGLES, TRIANGLES / len(model.faces))
     for row, face in enumerate(model.faces):
         area, low, high = 0.0, np.full(2, np.inf), np.full(2, -np.inf)
@@ -64,11 +68,11 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
                 low, high = np.minimum(low, xy.min(axis=0)), np.maximum(high, xy.max(axis=0))
         diameter = float(np.linalg.norm(high - low))
         even = np.sqrt(2.3 * abs(area) / wanted)
-        out[row] = max(diameter / DIVISIONS, min(diameter / 8.0, even))
+        out[row] = max(diameter / divisions, min(diameter / 8.0, even))
     return out * options.background
 
 
-def curve_spacing(model: Model, options: MeshOptions) -> tuple[Float, ...]:
+def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None) -> tuple[Float, ...]:
     """Background nodes of all curves, the same for all faces of a curve.
 
     Parameters
@@ -76,40 +80,79 @@ def curve_spacing(model: Model, options: MeshOptions) -> tuple[Float, ...]:
     model : Model
     options : MeshOptions
         `background` is a factor on all sizes.
+    sizes : (f,) float64, optional
+        What `face_sizes` returns.
 
     Returns
     -------
     tuple of (k + 1,) float64
-        For every curve increasing arc lengths, 0 and the length included; at least 2 segments, 8 on a closed curve.
+        For every curve increasing arc lengths, 0 and the length included; at least 8 segments on a closed curve, 2 on
+        others, 1 on a short piece of a chain that hardly bends.
     """
+    sizes = face_sizes(model, options) if sizes is None else sizes
     track, uses = Track(model), Uses.of(model)
     coarsest = np.full(len(model.curves), np.inf)
-    np.minimum.at(coarsest, uses.curve, face_sizes(model, options)[uses.face])
-    closed = np.array([c.closed for c in model.curves])
-    least = np.where(closed, 8, np.where(track.length > coarsest, 4, np.where(track.length > 0.5 * coarsest, 3, 2)))
+    np.minimum.at(coarsest, uses.curve, sizes[uses.face])
+    least = _least_segments(model, uses, track.length / coarsest)
     base = np.minimum(coarsest, track.length / least)
     corner = _corner_sizes(model, uses, base)
 
-    density = track.s / (0.5 * base)[track.curve] + track.turning / np.radians(10.0)
+    density = track.s / (0.8 * base)[track.curve] + track.turning / np.radians(12.0)
     share = density[track.last] - density[track.first]
-    s, curve = track.divide(density, np.maximum(8, np.ceil(share)).astype(np.int64), track.curve, track.s)
+    s, curve = track.divide(density, np.maximum(least, np.ceil(share)).astype(np.int64), track.curve, track.s)
     cells = track.cells(s, curve)
+    budget = WANTED_NODES + float(least.sum())
     factor = GAP * options.background
     for round_ in range(ROUNDS):
         near = neighbours(model, cells, uses)
-        h = _limited(model, track, cells, near, base, corner, factor, options.background)
-        if round_ + 1 == ROUNDS or (cells.length <= 1.2 * h).all() or len(cells.curve) > MAX_CELLS:
+        for _ in range(20):
+            h = _limited(model, track, cells, near, base, corner, factor, options.background)
+            nodes = float((cells.length / h).sum())
+            # too many: what narrow gaps ask for may be coarser, a little in favour of speed, much to stay within bounds
+            if nodes <= budget or (factor >= WIDE_GAP * options.background and nodes <= MAX_NODES + budget):
+                break
+            factor *= 1.5
+        if round_ + 1 == ROUNDS or (cells.length <= 1.2 * h).all():
             break
-        s, curve = _divide(track, cells, h / 1.7, least)
+        s, curve = _divide(track, cells, h / 1.3, least)
         cells = track.cells(s, curve)
-    for _ in range(20):
-        s, curve = _divide(track, cells, h, least)
-        if len(s) <= MAX_NODES + 2 * int(least.sum()):
-            break
-        # too many: only what narrow gaps ask for may be coarser
-        factor *= 1.5
-        h = _limited(model, track, cells, near, base, corner, factor, options.background)
+    s, curve = _divide(track, cells, h, least)
     return tuple(np.split(s, np.flatnonzero(np.diff(curve)) + 1))
+
+
+def _least_segments(model: Model, uses: Uses, relative: Float) -> Int:
+    """Least number of segments (c,) of every curve; `relative` are their lengths over the size of their faces."""
+    ends = np.array([(c.start, c.end) for c in model.curves])
+    closed = ends[:, 0] == ends[:, 1]
+    out = np.where(closed, 8, np.where(relative > 1.0, 4, np.where(relative > 0.5, 3, 2)))
+    bent = np.zeros(len(model.vertices), bool)
+    for vertex, angle in _corners(model):
+        bent[vertex[np.abs(angle - np.pi) > STRAIGHT]] = True
+    embedded = uses.curve[uses.sign == 0]
+    bent[ends[embedded].ravel()] = True
+    # two curves between the same vertices must not become the same segment
+    pair = np.sort(ends, axis=1)
+    _, inverse, count = np.unique(pair[:, 0] * len(model.vertices) + pair[:, 1], return_inverse=True, return_counts=True)
+    chain = (relative < SHORT) & ~bent[ends].any(axis=1) & ~closed & (count[inverse] == 1)
+    return np.where(chain, 1, out)
+
+
+def _corners(model: Model) -> list[tuple[Int, Float]]:
+    """For every loop of every face its vertices and the angles there, of the sampled curves."""
+    ends = np.array([(c.start, c.end) for c in model.curves])
+    first = np.stack([c.points[1] - c.points[0] for c in model.curves])
+    last = np.stack([c.points[-2] - c.points[-1] for c in model.curves])
+    out = []
+    for face in model.faces:
+        leave = np.stack([first @ face.axes.T, last @ face.axes.T], axis=1)
+        for loop in face.loops:
+            rows, signs = np.array(loop).T
+            begin, end = np.where(signs > 0, 0, 1), np.where(signs > 0, 1, 0)
+            outgoing, incoming = leave[rows, begin], np.roll(leave[rows, end], 1, axis=0)
+            cross = outgoing[:, 0] * incoming[:, 1] - outgoing[:, 1] * incoming[:, 0]
+            dot = np.einsum("ij,ij->i", outgoing, incoming)
+            out.append((ends[rows, begin], np.mod(np.arctan2(cross, dot), 2 * np.pi)))
+    return out
 
 
 def _divide(track: Track, cells: Cells, h: Float, least: Int) -> tuple[Float, Int]:
@@ -131,23 +174,11 @@ def _corner_sizes(model: Model, uses: Uses, base: Float) -> Float:
     local = np.full(len(model.vertices), np.inf)
     np.minimum.at(local, ends.ravel(), np.repeat(base, 2))
     out = np.full(len(model.vertices), np.inf)
-    first = np.stack([c.points[1] - c.points[0] for c in model.curves])
-    last = np.stack([c.points[-2] - c.points[-1] for c in model.curves])
-    for face in model.faces:
-        leave = np.stack([first @ face.axes.T, last @ face.axes.T], axis=1)
-        for loop in face.loops:
-            rows = np.array([c for c, _ in loop])
-            forward = np.array([sign > 0 for _, sign in loop])
-            outgoing = leave[rows, np.where(forward, 0, 1)]
-            incoming = np.roll(leave[rows, np.where(forward, 1, 0)], 1, axis=0)
-            vertex = ends[rows, np.where(forward, 0, 1)]
-            cross = outgoing[:, 0] * incoming[:, 1] - outgoing[:, 1] * incoming[:, 0]
-            angle = np.mod(np.arctan2(cross, np.einsum("ij,ij->i", outgoing, incoming)), 2 * np.pi)
-            special = (angle < SHARP) | (angle > REENTRANT)
-            np.minimum.at(out, vertex[special], CORNER * local[vertex[special]])
-        for c in face.embedded_curves:
-            if not model.curves[c].closed:
-                out[ends[c]] = np.minimum(out[ends[c]], TIP * local[ends[c]])
+    for vertex, angle in _corners(model):
+        special = (angle < SHARP) | (angle > REENTRANT)
+        np.minimum.at(out, vertex[special], CORNER * local[vertex[special]])
+    tips = ends[uses.curve[uses.sign == 0]].ravel()
+    np.minimum.at(out, tips, TIP * local[tips])
     return out
 
 

@@ -17,10 +17,11 @@ from . import session
 from .outline import Outline
 from .size_field import SizeField
 
-__all__ = ["triangulate"]
+__all__ = ["OPTIONS", "triangulate"]
 
 ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt
-OPTIONS = {
+# the options under which `triangulate` must be called
+OPTIONS: dict[str, float] = {
     "Mesh.AlgorithmSwitchOnFailure": 0,
     "Mesh.ElementOrder": 1,
     "Mesh.MaxNumThreads1D": 1,
@@ -96,7 +97,7 @@ def _generate(shape: Outline, unit: Float, size: SizeField, algorithm: int, tag:
     before = getattr(gmsh, "api_callback_", None)
     with (
         session.gmsh_errors("triangulating", entity=(2, tag)),
-        session.options(**OPTIONS, **{"Mesh.Algorithm": algorithm}),
+        session.options(**{"Mesh.Algorithm": algorithm}),
         session.scratch_model(),
     ):
         geo, mesh = gmsh.model.geo, gmsh.model.mesh
@@ -117,7 +118,7 @@ def _generate(shape: Outline, unit: Float, size: SizeField, algorithm: int, tag:
         try:
             mesh.generate(2)
             tags, coordinates, _ = mesh.getNodes()
-            corner_tags, corners, _ = mesh.getNodes(0)
+            corner_tags, _, _ = mesh.getNodes(0)
             _, nodes = mesh.getElementsByType(2)
         finally:
             mesh.removeSizeCallback()
