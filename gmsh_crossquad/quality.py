@@ -87,14 +87,19 @@ def curve_edges(mesh: QuadMesh) -> Int:
     return out
 
 
-def is_conforming(mesh: QuadMesh, twin: Int, on_curve: Bool) -> bool:
-    """Whether every edge off the CAD curves has exactly two quads, of one face and oriented alike."""
-    inner = np.flatnonzero(~on_curve)
-    other = twin[inner]
-    if (other < 0).any():
-        return False
-    start = mesh.quads.ravel()
-    return bool((mesh.quad_face[inner // 4] == mesh.quad_face[other // 4]).all() and (start[inner] != start[other]).all())
+def is_conforming(mesh: QuadMesh, on_curve: Bool) -> bool:
+    """Whether every edge off the CAD curves has exactly two quads, of one face and oriented alike.
+
+    Then each edge is run once in either direction: the sorted keys (face, lower node, higher node) of the half-edges that run
+    upwards and of those that run downwards are the same, and none occurs twice.
+    """
+    inner = ~on_curve
+    start = mesh.quads.ravel()[inner]
+    end = np.roll(mesh.quads, -1, axis=1).ravel()[inner]
+    n = len(mesh.points)
+    key = (np.repeat(mesh.quad_face, 4)[inner] * n + np.minimum(start, end)) * n + np.maximum(start, end)
+    upwards, downwards = np.sort(key[start < end]), np.sort(key[start >= end])
+    return bool(np.array_equal(upwards, downwards) and (upwards[1:] > upwards[:-1]).all())
 
 
 def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
@@ -111,8 +116,6 @@ def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     Quality
     """
     value = scaled_jacobian(mesh.points, mesh.quads, normals[mesh.quad_face])
-    twin = twins(mesh.quads)
-    on_curve = curve_edges(mesh) >= 0
     inner = np.ones(len(mesh.points), bool)
     for chain in mesh.curve_nodes:
         inner[chain] = False
@@ -127,5 +130,5 @@ def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
         p5_scaled_jacobian=float(np.quantile(value, 0.05)),
         mean_scaled_jacobian=float(value.mean()),
         inverted=int((value <= 0.0).sum()),
-        conforming=is_conforming(mesh, twin, on_curve),
+        conforming=is_conforming(mesh, curve_edges(mesh) >= 0),
     )

@@ -79,6 +79,18 @@ def test_quality_sees_a_fold_and_a_slit():
     assert not measure_quality(cut, UP).conforming
 
 
+def test_conformity_wants_equal_orientation_and_single_quads():
+    mesh = two_squares_mesh()
+    turned = mesh.quads.copy()
+    turned[0] = turned[0][::-1]
+    assert not measure_quality(replace(mesh, quads=turned), UP).conforming
+    twice = {n: np.concatenate([getattr(mesh, n)] * 2) for n in ("quads", "quad_face", "quad_block")}
+    assert not measure_quality(replace(mesh, **twice), UP).conforming
+    other = mesh.quad_face.copy()
+    other[0] = 1  # an inner edge between two faces
+    assert not measure_quality(replace(mesh, quad_face=other), UP).conforming
+
+
 def test_irregular_vertices_are_counted_inside_only():
     # three quads around a vertex: the hexagon
     angle = np.arange(6) * np.pi / 3
