@@ -70,8 +70,8 @@ class Clearance:
     def wanted(self, points: Float) -> Float:
         """(k,) distances that singularities at these points should keep from the boundary."""
         inside, depth = self._depth
-        far = np.hypot(*(points[:, None] - inside[None]).transpose(2, 0, 1)) > 1.5 * depth
-        rho = np.where(far, 0.0, depth).max(axis=1)
+        x, y = (points[:, None] - inside[None]).transpose(2, 0, 1)
+        rho = np.where(x * x + y * y > (1.5 * depth) ** 2, 0.0, depth).max(axis=1)
         return np.minimum(0.4 * rho, 0.6 * self._size[self._tree.query(points)[1]])
 
     def free_length(self, origin: Float, direction: Float, spread: float, start: float) -> float:

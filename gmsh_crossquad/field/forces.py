@@ -12,6 +12,7 @@ which never looks at the core and is one sum over the vertices.
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..records import Float
 from .surface_mesh import SurfaceMesh
@@ -54,6 +55,9 @@ def forces(mesh: SurfaceMesh, rotation: Float, positions: Float, reach: Float) -
     part = np.sum(slope * g[:, None], axis=2)[..., None] * g[:, None] - density[:, None, None] * slope
     opposite = np.roll(mesh.triangles, -2, axis=1).ravel()
     nodal = [np.bincount(opposite, part[..., c].ravel(), len(mesh.points)) for c in range(2)]
-    away = np.hypot(*(mesh.points[None] - positions[:, None]).transpose(2, 0, 1))
-    hat = np.clip((reach[:, None] - away) / (0.7 * reach[:, None]), 0.0, 1.0)
-    return hat @ np.stack(nodal, axis=1)
+    force = np.stack(nodal, axis=1)
+    out = np.zeros((len(positions), 2))
+    for k, near in enumerate(cKDTree(mesh.points).query_ball_point(positions, reach, return_sorted=True)):
+        away = np.hypot(*(mesh.points[near] - positions[k]).T)
+        out[k] = np.minimum((reach[k] - away) / (0.7 * reach[k]), 1.0) @ force[near]
+    return out

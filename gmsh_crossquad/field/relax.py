@@ -153,8 +153,8 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
     mesh = aligner.mesh
     vertices, index = singular_vertices(mesh, field.rotation)
     here = mesh.points[vertices]
-    moving = ~np.isin(vertices, held)
-    moving[moving] = clearance.distance(here[moving])[0] < clearance.wanted(here[moving])
+    keep = clearance.wanted(here) if len(here) else np.zeros(0)
+    moving = ~np.isin(vertices, held) & (clearance.distance(here)[0] < keep)
     if not np.any(moving):
         return field
     pace = np.full(len(vertices), 0.25)
@@ -173,10 +173,9 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
         length = np.hypot(step[:, 0], step[:, 1])
         step *= np.minimum(1.0, 0.5 * clear / np.maximum(length, np.finfo(float).tiny))[:, None]
         goal = here + step
-        wanted = clearance.wanted(here)
         for _ in range(3):
             depth, away = clearance.distance(goal)
-            goal += np.maximum(wanted - depth, 0.0)[:, None] * away
+            goal += np.maximum(keep - depth, 0.0)[:, None] * away
         rotation = field.rotation.copy()
         barred = mesh.boundary_vertex | avoid
         barred[vertices] = True

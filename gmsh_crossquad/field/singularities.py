@@ -175,9 +175,10 @@ def snap_to_vertices(mesh: SurfaceMesh, rotation: Float, avoid: Bool | None = No
         k = max(corners, key=preference)
         out[t, (k + 2) % 3] -= q * QUARTER
         at_vertex[mesh.triangles[t, k]] += q
-    for v in np.flatnonzero((at_vertex != 0) & avoid) if avoid is not None else ():
-        free = [w for w in mesh.neighbours(int(v)) if not (mesh.boundary_vertex[w] or avoid[w] or at_vertex[w])]
+    barred = np.zeros(len(mesh.points), bool) if avoid is None else avoid
+    for v in np.flatnonzero((at_vertex != 0) & barred).tolist():
+        free = [w for w in mesh.neighbours(v) if not (mesh.boundary_vertex[w] or barred[w] or at_vertex[w])]
         if free:
-            move_index(mesh, out, [int(v), free[0]], int(at_vertex[v]))
+            move_index(mesh, out, [v, free[0]], int(at_vertex[v]))
             at_vertex[free[0]], at_vertex[v] = at_vertex[v], 0
     return out
