@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gmsh_crossquad.embed.chain_energy import GAP_WEIGHT, GRADE_WEIGHT, ChainEnergy
 from gmsh_crossquad.embed.curve_table import CurveTable
 from gmsh_crossquad.embed.energy import AREA_WEIGHT, corner_areas, corner_energy, corner_hessian
 from gmsh_crossquad.embed.grid_energy import GridEnergy
@@ -179,3 +180,51 @@ def test_scaled_jacobian_in_chunks() -> None:
 
 def test_guide_quality_knows_the_planes_of_the_faces() -> None:
     assert guide_quality(*fold(3, 2.0)) == pytest.approx(1.0)
+
+
+def test_chain_terms_by_hand() -> None:
+    """One straight curve of length 1 with two sliding vertices."""
+    guide, model = mapped_grid(rectangle(), 3, 1)
+    table = CurveTable(model.curves)
+    row = np.full(len(guide.points), -1)
+    row[guide.chains[0][1:-1]] = [0, 1]
+    row[guide.chains[2][1:-1]] = [2, 3]
+    third = np.full(3, 1 / 3)
+    chains = ChainEnergy(guide, model, (third, np.ones(1), third, np.ones(1)), table, row, 4)
+    even = np.array([1 / 3, 2 / 3, 1 / 3, 2 / 3])
+    energy, by_place, by_turn = chains.value(even, np.zeros(4))
+    assert energy == pytest.approx(6 * GAP_WEIGHT)
+    assert by_place == pytest.approx(0.0, abs=1e-12)
+    assert by_turn == pytest.approx(0.0)
+    moved = np.array([0.05, 0.5, 1 / 3, 2 / 3])
+    gaps = np.array([0.05, 0.45, 0.5])
+    expected = 3 * GAP_WEIGHT + 0.5 * GAP_WEIGHT * (3 * gaps + 1 / (3 * gaps)).sum()
+    # 0.45 / 0.05 = 9 on the curve; in the corner 0.05 and the even third on the opposite curve are not neighbours.
+    expected += GRADE_WEIGHT * np.log(9 / 2) ** 2
+    assert chains.value(moved, np.zeros(4))[0] == pytest.approx(expected)
+    for wrong in ([0.5, 0.5, 0.3, 0.6], [0.6, 0.5, 0.3, 0.6], [-0.1, 0.5, 0.3, 0.6]):
+        assert chains.value(np.array(wrong), np.zeros(4))[0] == np.inf
+
+
+def test_chain_hessian_is_the_second_derivative_where_nothing_is_dropped() -> None:
+    """The ordering term; the turning term for a constant rate."""
+    guide, model = mapped_grid(sector(0.5, 1.0, 2.0), 1, 3)
+    grid = GridEnergy(guide, model, CurveTable(model.curves), rest_lengths(guide, model, CurveTable(model.curves)))
+    chains = grid._chains
+    s = np.array([0.3, 0.7, 0.6, 1.4])
+    rate = np.array([2.0, 2.0, 1.0, 1.0])
+    edges, pairs = chains.hessian(s, rate * s, np.ones(4), rate)
+    full = np.zeros((5, 5))
+    for rows, blocks in ((chains.edges, edges), (chains.pairs, pairs)):
+        rows = np.minimum(rows, 4)
+        for k in range(len(rows)):
+            np.add.at(full, np.ix_(rows[k], rows[k]), blocks[:, :, k])
+    step = 1e-5
+
+    def gradient(at: Float) -> Float:
+        _, by_place, by_turn = chains.value(at, rate * at)
+        return by_place + by_turn * rate
+
+    numeric = np.column_stack([(gradient(s + step * e) - gradient(s - step * e)) / (2 * step) for e in np.eye(4)])
+    assert chains.value(s, 0 * s)[0] != chains.value(s, rate * s)[0]
+    assert full[:4, :4] == pytest.approx(numeric, rel=1e-4, abs=1e-4 * np.abs(numeric).max())

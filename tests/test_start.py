@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from gmsh_crossquad.embed.curve_table import CurveTable
 from gmsh_crossquad.embed.quality import guide_quality
-from gmsh_crossquad.embed.rest_lengths import LEAST_RATIO, rest_lengths
+from gmsh_crossquad.embed.rest_lengths import LEAST_RATIO, _limit, rest_lengths
 from gmsh_crossquad.embed.start import LEAST_GAP, chain_arclengths, grid_edges, laplace_start, spread_chains
 from gmsh_crossquad.errors import MeshError
 from gmsh_crossquad.records import Float, Guide, Int, Model
@@ -190,3 +190,37 @@ def test_a_short_curve_keeps_its_length_and_the_others_theirs() -> None:
     for row in (0, 2):
         ratio = np.exp(np.abs(np.diff(np.log(rest.chains[row]))))
         assert ratio.max() < LEAST_RATIO + 1e-9
+
+
+def test_a_chain_must_run_along_edges() -> None:
+    guide, model = mapped_grid(rectangle(), 4, 4)
+    chain = guide.chains[1][[0, 2, 1, 3, 4]]
+    broken = replace(guide, chains=(guide.chains[0], chain, *guide.chains[2:]))
+    with pytest.raises(MeshError, match="curve 2"):
+        rest_lengths(broken, model, CurveTable(model.curves))
+
+
+def test_limit_brings_neighbours_within_the_ratio() -> None:
+    """One jump of a factor 1000 in a row of edges; the first edge is held, and does not count."""
+    u = np.log(np.array([1e-6] + [1.0] * 6 + [1e-3] * 6))
+    pairs = np.column_stack([np.arange(12), np.arange(1, 13)])
+    held = np.zeros(13, dtype=bool)
+    held[0] = True
+    out = _limit(u, pairs, held)
+    assert out[:2].tolist() == u[:2].tolist()
+    assert np.abs(np.diff(out[1:])).max() < 0.4 * np.log(1000.0)
+    quarter = np.array([0.0, np.log(4.0)])
+    two = _limit(quarter, np.array([[0, 1]]), np.zeros(2, dtype=bool))
+    assert two == pytest.approx(np.log([np.sqrt(2), 2 * np.sqrt(2)]))
+
+
+def test_edges_are_shorter_where_a_curve_turns() -> None:
+    def nose(u: Float, v: Float) -> Float:
+        angle = np.pi * (v - 0.5)
+        return np.column_stack([(1 + u) * np.cos(angle), (0.2 + u) * np.sin(angle), 0.0 * u])
+
+    guide, model = mapped_grid(nose, 3, 3)
+    guide = replace(guide, quad_size=np.full_like(guide.quad_size, 0.5))
+    first, tip, last = rest_lengths(guide, model, CurveTable(model.curves)).chains[3]
+    assert tip < 0.8 * first
+    assert last == pytest.approx(first)
