@@ -15,6 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..errors import MeshError
 from ..records import Float, Guide, Model
 from .chain_energy import ChainEnergy
 from .curve_table import CurveTable
@@ -176,7 +177,10 @@ class GridEnergy:
         data = np.asarray(np.bincount(self._target, values[self._kept], minlength=len(self._indices)), dtype=np.float64)
         data[self._diagonal] *= 1.0 + 1e-9
         matrix = csc_array((data, self._indices, self._indptr), shape=(self.size, self.size))
-        lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        try:
+            lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        except RuntimeError as failure:
+            raise MeshError("the guide grid is degenerate, its Hessian is singular", remedy="another size may help") from failure
         solve: Callable[[Float], Float] = lu.solve
         return solve
 

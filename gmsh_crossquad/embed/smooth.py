@@ -43,6 +43,8 @@ SHARPENING = (12, 6)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
 WANTED = 0.85
 LEAST_AREA = 1e-3
+VALID = 1e-6
+"""Scaled Jacobian from which a grid is inside the barrier beyond doubt."""
 GOOD = 0.7
 
 
@@ -101,11 +103,11 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
         if valid:
             break
     for power, effort in POLISHING:
-        polished = _polish(best, model, table, rest, power, effort, barrier=quality > 0.0)
+        polished = _polish(best, model, table, rest, power, effort, barrier=quality > VALID)
         score = float(guide_quality(polished, model).min())
         if min(score, GOOD) >= min(quality, GOOD):
             best, quality = polished, score
-    if 0.0 < quality < WANTED:
+    if VALID < quality < WANTED:
         polished = _polish(best, model, table, rest, *SHARPENING, barrier=True)
         if guide_quality(polished, model).min() > quality:
             best = polished
