@@ -172,3 +172,10 @@ def test_singularity_of_a_sharp_corner_goes_to_the_bisector(degrees):
     assert 0.3 * radius < np.hypot(*v) < 0.8 * radius
     centre = mesh.points.mean(axis=0) - mesh.points[tip]
     assert abs(v[0] * centre[1] - v[1] * centre[0]) / np.hypot(*v) / np.hypot(*centre) < np.sin(np.radians(degrees) / 4)
+
+
+def test_room_is_shared_between_neighbours():
+    clearance = Clearance(grid(20, 20), [])
+    room = clearance.room(np.array([[10.0, 10.0], [13.0, 10.0], [2.0, 10.0]]))
+    assert np.allclose(room, [1.5, 1.5, 2.0], atol=0.01)
+    assert clearance.room(np.array([[10.0, 10.0]]))[0] == pytest.approx(10.0, abs=0.01)

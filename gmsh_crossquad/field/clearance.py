@@ -74,6 +74,12 @@ class Clearance:
         rho = np.where(x * x + y * y > (1.5 * depth) ** 2, 0.0, depth).max(axis=1)
         return np.minimum(0.4 * rho, 0.6 * self._size[self._tree.query(points)[1]])
 
+    def room(self, points: Float) -> Float:
+        """(k,) distances to the boundary or half way to the next of the points, whichever is less."""
+        apart = np.hypot(*(points[:, None] - points[None]).transpose(2, 0, 1))
+        np.fill_diagonal(apart, np.inf)
+        return np.minimum(self.distance(points)[0], 0.5 * apart.min(axis=1))
+
     def free_length(self, origin: Float, direction: Float, spread: float, start: float) -> float:
         """Length from a boundary vertex over which a sector is free of other boundary.
 

@@ -161,10 +161,7 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
     previous = np.zeros_like(here)
     for _ in range(_ROUNDS):
         here = mesh.points[vertices]
-        depth, _ = clearance.distance(here)
-        apart = np.hypot(*(here[:, None] - here[None]).transpose(2, 0, 1))
-        np.fill_diagonal(apart, np.inf)
-        clear = np.minimum(depth, 0.5 * apart.min(axis=1))
+        clear = clearance.room(here)
         force = forces(mesh, field.rotation, here, 0.9 * clear)
         turned = np.sum(force * previous, axis=1) < 0
         pace = np.where(turned, 0.5 * pace, pace)
