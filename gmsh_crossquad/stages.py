@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .cad.background import background_meshes
-from .cad.put import curve_points
+from .cad.put import curve_points, vertex_points
 from .cad.read import read_model
 from .cad.sizes import SizeMap, target_sizes
 from .cad.validate import validate
@@ -24,7 +24,7 @@ from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
 from .field.pipeline import aligned_field
 from .fill.numbering import guide_chords
-from .fill.pipeline import fill
+from .fill.pipeline import fill, poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.face_tmesh import trace_face
@@ -126,12 +126,15 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
         if wrong:
             raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
-    guide, fine = _smooth_guide(model, tmesh, coarse, size, np.sqrt(area / GUIDE_QUADS), watch, notes)
+    guide, fine = _smooth_guide(model, tmesh, coarse, size, float(np.sqrt(area / GUIDE_QUADS)), watch, notes)
     with watch.stage("fill"):
-        mesh = fill(model, guide, fine, lambda c, t: curve_points(model, c, t))
-    return StagesResult(
-        model, meshes, fields, tmesh, coarse, guide, fine, replace(mesh, notes=tuple(notes)), tuple(notes), dict(watch.seconds)
-    )
+        mesh = fill(model, guide, fine, _evaluator(model), vertex_points(model))
+    mesh = replace(mesh, notes=(*notes, *mesh.notes))
+    return StagesResult(model, meshes, fields, tmesh, coarse, guide, fine, mesh, mesh.notes, dict(watch.seconds))
+
+
+def _evaluator(model: Model) -> Callable[[int, Float], Float]:
+    return lambda curve, parameters: curve_points(model, curve, parameters)
 
 
 def _area(mesh: FaceMesh) -> float:
@@ -202,48 +205,57 @@ def _arc_sizes(model: Model, tmesh: TMesh, sizes: SizeMap) -> Float:
 def _smooth_guide(
     model: Model, tmesh: TMesh, coarse: Int, size: Float, guide_size: float, watch: Watch, notes: list[str]
 ) -> tuple[Guide, Int]:
-    """The smoothed guide grid, with more guide cells where cells stay inverted."""
+    """The smoothed guide grid and its final divisions; chords of cells that cannot be filled well get more guide cells."""
     with watch.stage("guide"):
         chords = find_chords(tmesh, quotient(tmesh, coarse))
     finer: Int | None = None
-    best: tuple[float, Guide, Int] | None = None
+    best: tuple[int, float, Guide, Int] | None = None
     for round_ in range(ROUNDS):
         with watch.stage("guide"):
             divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer)
-            counts = arc_divisions(chords, divisions.guide)
-            q = quotient(tmesh, counts)
+            q = quotient(tmesh, arc_divisions(chords, divisions.guide))
             wrong = problems(model, tmesh, q)
             if wrong:
                 raise LayoutError(f"the guide grid is not valid ({wrong[0]})", remedy="another size may help")
-            fine = tuple(
-                np.concatenate([np.repeat(divisions.fine[chords.arc_segments[a]], divisions.guide[chords.arc_segments[a]]) for a in p])
-                for p in tmesh.pieces
-            )
-            start = place(model, tmesh, q, fine)
+            start = place(model, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
+            coarse_chord = _coarse_chords(tmesh, q, chords, divisions)
+            fine = divisions.fine[coarse_chord]
         with watch.stage("smooth"):
             guide, report = smooth(start, model)
-        if best is None or report.min_scaled_jacobian > best[0]:
-            best = (report.min_scaled_jacobian, guide, _guide_chord_divisions(tmesh, q, chords, divisions))
-        if not len(report.inverted):
+        with watch.stage("fill"):
+            bad = report.inverted
+            if not len(bad):
+                bad = poor_cells(model, guide, fine, _evaluator(model), vertex_points(model))
+        if best is None or (-len(report.inverted), report.min_scaled_jacobian) > best[:2]:
+            best = (-len(report.inverted), report.min_scaled_jacobian, guide, fine)
+        if not len(bad):
             break
-        notes.append(f"{len(report.inverted)} guide cells were inverted after smoothing round {round_ + 1}; their chords were refined")
-        finer = 2 * divisions.guide
+        if round_ + 1 < ROUNDS:
+            notes.append(f"{len(bad)} guide cells could not be filled well; their chords were refined")
+        _, quad_edges, chord, _ = guide_chords(guide.quads)
+        finer = divisions.guide.copy()
+        finer[np.unique(coarse_chord[chord[quad_edges[bad]]])] *= 2
     assert best is not None
-    quality, guide, final = best
-    if quality <= 0:
+    inverted, _, guide, fine = best
+    if inverted:
         raise MeshError("the layout cannot be laid into the faces without inverted cells", remedy="a smaller size may help")
-    return guide, final
+    return guide, fine
 
 
+def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:
+    """Final edges of every guide edge along a curve."""
+    segment = np.concatenate([chords.arc_segments[arc] for arc in pieces])
+    return np.repeat(divisions.fine[segment], divisions.guide[segment])
 
-def _guide_chord_divisions(tmesh: TMesh, q: Quotient, chords: Chords, divisions: ChordDivisions) -> Int:
-    """Final edges per guide edge for every guide chord; every guide chord ends or passes on an arc."""
+
+def _coarse_chords(tmesh: TMesh, q: Quotient, chords: Chords, divisions: ChordDivisions) -> Int:
+    """Coarse chord of every guide chord; every guide chord ends on an arc or crosses one."""
     edges, _, chord, n = guide_chords(q.quads)
     keys = edges[:, 0] * q.n_vertices + edges[:, 1]
-    out = np.ones(n, np.int64)
+    out = np.full(n, -1, np.int64)
     for arc in np.flatnonzero(q.divisions > 0).tolist():
         v = q.vertex[arc_points(tmesh, q.divisions, q.offset, arc)]
         key = np.minimum(v[:-1], v[1:]) * q.n_vertices + np.maximum(v[:-1], v[1:])
         segment = chords.arc_segments[arc]
-        out[chord[np.searchsorted(keys, key)]] = np.repeat(divisions.fine[segment], divisions.guide[segment])
+        out[chord[np.searchsorted(keys, key)]] = np.repeat(segment, divisions.guide[segment])
     return out

@@ -50,10 +50,9 @@ def base_complex(quads: Int, quad_face: Int, curve_edges: Int, n_vertices: int, 
     a, b = order[first[two]], order[first[two] + 1]
     twin[a], twin[b] = b, a
 
-    following = np.arange(4 * len(quads)).reshape(-1, 4)
-    following = np.roll(following, -1, axis=1).ravel()
-    previous = np.arange(4 * len(quads)).reshape(-1, 4)
-    previous = np.roll(previous, 1, axis=1).ravel()
+    corners = np.arange(4 * len(quads)).reshape(-1, 4)
+    following = np.roll(corners, -1, axis=1).ravel()
+    previous = np.roll(corners, 1, axis=1).ravel()
     origin = quads.ravel()
     on_curve = np.zeros(n_vertices, bool)
     on_curve[curve_edges.ravel()] = True
@@ -61,21 +60,20 @@ def base_complex(quads: Int, quad_face: Int, curve_edges: Int, n_vertices: int, 
     spokes = np.flatnonzero(twin >= 0)
     m = 4 * len(quads)
     links = coo_array((np.ones(len(spokes)), (spokes, following[twin[spokes]])), shape=(m, m))
-    fan = connected_components(links, directed=False)[1]
+    fan = connected_components(links, directed=False)[1].astype(np.int64)
     fan_size = np.bincount(fan)
     irregular_fan = fan_size != np.where(on_curve[_first_origin(fan, origin)], 2, 4)
 
-    mark_lines(twin, following, previous, fan, irregular_fan, flat, mark)
+    _mark_lines(twin, following, previous, fan, irregular_fan, flat, mark)
     while True:
         inner = np.flatnonzero((twin >= 0) & ~mark[flat])
-        block = connected_components(
-            coo_array((np.ones(len(inner)), (inner // 4, twin[inner] // 4)), shape=(len(quads), len(quads))), directed=False
-        )[1]
+        neighbours = coo_array((np.ones(len(inner)), (inner // 4, twin[inner] // 4)), shape=(len(quads), len(quads)))
+        block = connected_components(neighbours, directed=False)[1].astype(np.int64)
         ring = _ring(block, quads, flat, mark, twin, following, corner)
         if ring < 0:
             break
         _line(ring, twin, following, mark, flat, None)
-    return block.astype(np.int64), edges[mark]
+    return block, edges[mark]
 
 
 def _first_origin(fan: Int, origin: Int) -> Int:
@@ -84,7 +82,7 @@ def _first_origin(fan: Int, origin: Int) -> Int:
     return out
 
 
-def mark_lines(twin: Int, following: Int, previous: Int, fan: Int, irregular_fan: Bool, flat: Int, mark: Bool) -> None:
+def _mark_lines(twin: Int, following: Int, previous: Int, fan: Int, irregular_fan: Bool, flat: Int, mark: Bool) -> None:
     """Mark the straight lines that leave irregular fans."""
     for h in np.flatnonzero(irregular_fan[fan]).tolist():
         for start in (h, int(twin[previous[h]])):

@@ -150,9 +150,7 @@ def _caps(model: Model, tmesh: TMesh, divisions: Int, seg: Segments, n: int, siz
     return cap
 
 
-def _prescribe(
-    model: Model, tmesh: TMesh, chords: Chords, guide: Int, fine: Int, prescribed: dict[int, int]
-) -> tuple[Int, Int]:
+def _prescribe(model: Model, tmesh: TMesh, chords: Chords, guide: Int, fine: Int, prescribed: dict[int, int]) -> tuple[Int, Int]:
     """Total divisions per chord nearest to the wanted ones whose sums over the prescribed curves are exact."""
     import scipy.sparse as sp
     from scipy.optimize import Bounds, LinearConstraint, milp

@@ -114,19 +114,19 @@ def quantize(
     weight = 1.0 / np.maximum(target, 0.5)
     # columns u, e, d; n = floor + u + e - d
     cost = np.concatenate([weight * (1 - 2 * fraction), weight, weight])
-    largest = 4.0 * max(float(target.max(initial=0.0)), 10.0) + 20.0
+    largest = 4.0 * max(float(target.max(initial=0.0)), 10.0) + 20.0 + len(model.curves)  # opposite a run of short curves
     upper = np.concatenate([np.ones(n_arcs), np.full(n_arcs, largest), floor])
     identity = sp.eye_array(n_arcs, format="csr")
     expand = sp.hstack([identity, identity, -identity], format="csr")
     balance = _balance(tmesh)
-    fixed_rows = [LinearConstraint(balance @ expand, -(balance @ floor), -(balance @ floor))]
+    fixed_rows: list[tuple[sp.csr_array, Float, Float]] = [(balance @ expand, -(balance @ floor), -(balance @ floor))]
     for bounds, equal in ((exact or {}, True), (at_most or {}, False)):
         if bounds:
             row = np.concatenate([np.full(len(tmesh.pieces[c]), i) for i, c in enumerate(bounds)])
             col = np.concatenate([np.array(tmesh.pieces[c]) for c in bounds])
             m = sp.csr_array((np.ones(len(row)), (row, col)), shape=(len(bounds), n_arcs))
             rhs = np.array(list(bounds.values()), float) - m @ floor
-            fixed_rows.append(LinearConstraint(m @ expand, rhs if equal else -np.inf, rhs))
+            fixed_rows.append((m @ expand, rhs if equal else np.full(len(rhs), -np.inf), rhs))
 
     cuts = _at_least(tmesh, model)
     known = set(cuts)
@@ -135,13 +135,13 @@ def quantize(
         binaries = sum(len(c.options) for c in cuts if len(c.options) > 1)
         matrix, lower = _cut_rows(cuts, n_arcs, largest + float(floor.max(initial=0.0)), floor, expand, binaries)
         constraints = [LinearConstraint(matrix, lower, np.inf)]
-        for row in fixed_rows:
-            padded = sp.hstack([row.A, sp.csr_array((row.A.shape[0], binaries))], format="csr")
-            constraints.append(LinearConstraint(padded, row.lb, row.ub))
+        for fixed, least, most in fixed_rows:
+            padded = sp.hstack([fixed, sp.csr_array((fixed.shape[0], binaries))], format="csr")
+            constraints.append(LinearConstraint(padded, least, most))
         result = milp(
             np.concatenate([cost, np.zeros(binaries)]),
             constraints=constraints,
-            integrality=np.ones(3 * n_arcs + binaries),
+            integrality=np.ones(3 * n_arcs + binaries, np.int64),
             bounds=Bounds(np.zeros(3 * n_arcs + binaries), np.concatenate([upper, np.ones(binaries)])),
             options={"mip_rel_gap": 1e-2, "node_limit": 20_000, "time_limit": 60.0},
         )
