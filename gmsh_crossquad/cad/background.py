@@ -17,6 +17,7 @@ from ..field.surface_mesh import SurfaceMesh
 from ..options import MeshOptions
 from ..records import FaceMesh, Float, Int, Model
 from . import session
+from .bounds import kept_bounds
 from .outline import Outline, outline
 from .spacing import curve_spacing, face_sizes
 from .tangents import end_directions
@@ -65,7 +66,7 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
         Where a face cannot be triangulated.
     """
     shapes = [outline(model, row, spacing) for row in range(len(model.faces))]
-    with session.options(**OPTIONS):
+    with kept_bounds(), session.options(**OPTIONS):
         made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
     # everything that follows is done for all faces together
     offset = np.concatenate([[0], np.cumsum([len(p) for p, _ in made])])

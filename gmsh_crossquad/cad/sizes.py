@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["SizeMap", "target_sizes"]
 
+TRIAL = 32.0
+MEASURED_EDGES = 100_000.0
 MEASURED_ELEMENTS = 6000  # of the coarsened surface mesh
 KEPT_OPTIONS = {"Mesh.ElementOrder": 1, "Mesh.MeshOnlyVisible": 0, "Mesh.MeshOnlyEmpty": 0}
 
@@ -127,10 +129,7 @@ def _measured(model: Model, meshes: tuple[FaceMesh, ...]) -> SizeMap:
     snapshot = session.MeshSnapshot.take()
     try:
         with session.options(**KEPT_OPTIONS):
-            with session.gmsh_errors("meshing the curves to learn their sizes"):
-                gmsh.model.mesh.generate(1)
-                edges = [_curve_edges(curve, model) for curve in model.curves]
-            curve = _curve_sizes(model, edges)
+            curve = _measured_curves(model)
             if len(gmsh.model.mesh.field.list()):
                 face = _field_sizes(model, meshes, curve)
             else:
@@ -140,6 +139,23 @@ def _measured(model: Model, meshes: tuple[FaceMesh, ...]) -> SizeMap:
     if not all(np.isfinite(h).all() and (h > 0).all() for h in (*curve, *face)):
         raise MeshError("Gmsh gives no positive size somewhere", remedy="give the size explicitly")
     return SizeMap(model, meshes, None, curve, face)
+
+
+def _measured_curves(model: Model) -> tuple[Float, ...]:
+    """Sizes at the samples of every curve, from one curve mesh; it is coarser than Gmsh's where that would be very fine."""
+    factor = gmsh.option.getNumber("Mesh.MeshSizeFactor")
+    with session.gmsh_errors("meshing the curves to learn their sizes"):
+        with session.options(**{"Mesh.MeshSizeFactor": factor * TRIAL}):
+            gmsh.model.mesh.generate(1)
+        guess = TRIAL * sum(len(_curve_edges(curve, model)) for curve in model.curves)
+        coarser = max(1.0, guess / MEASURED_EDGES)
+        with session.options(**{"Mesh.MeshSizeFactor": factor * coarser}):
+            gmsh.model.mesh.generate(1)
+        edges = [_curve_edges(curve, model) for curve in model.curves]
+    sizes = _curve_sizes(model, edges)
+    if coarser == 1.0:
+        return sizes
+    return tuple(h / coarser if len(e) > 1 else np.minimum(h / coarser, c.length) for h, e, c in zip(sizes, edges, model.curves))
 
 
 def _curve_edges(curve: Curve, model: Model) -> Float:
