@@ -6,10 +6,11 @@ from tracing import field_of, midpoints, polygon_mesh
 from gmsh_crossquad.errors import LayoutError
 from gmsh_crossquad.field.pipeline import aligned_field
 from gmsh_crossquad.field.surface_mesh import SurfaceMesh
+from gmsh_crossquad.layout.crossing import AROUND, ONE, Chord, beside, meet, on_left
 from gmsh_crossquad.layout.face_tmesh import trace_face
 from gmsh_crossquad.layout.ports import fan
 from gmsh_crossquad.layout.step import CLEAR, ideal_exit
-from gmsh_crossquad.layout.trace import AROUND, ONE, Chord, grow, on_left
+from gmsh_crossquad.layout.trace import grow
 from gmsh_crossquad.layout.trace_mesh import trace_mesh
 from gmsh_crossquad.records import FaceMesh
 
@@ -47,6 +48,38 @@ def test_left_of_a_chord() -> None:
     assert not on_left(chord, ONE)
     assert on_left(chord, 0) and on_left(chord, 2 * ONE + 5)
     assert AROUND == 3 * ONE
+
+
+SOUTH, EAST, WEST = ONE // 2, ONE + ONE // 2, 2 * ONE + ONE // 2  # middles of the sides of a triangle
+
+
+@pytest.mark.parametrize("branch", range(4))
+def test_chords_cross_in_one_way_only(branch: int) -> None:
+    old = Chord(SOUTH, WEST, branch, 0, 0, None)  # cuts corner 0 off, on its left
+    assert meet([old], EAST, ONE // 4, (branch + 1) % 4) == (old, False)  # from right to left
+    assert meet([old], EAST, ONE // 4, (branch + 3) % 4) == (None, True)
+    assert meet([old], ONE // 4, EAST, (branch + 3) % 4) == (old, False)
+    assert meet([old], ONE // 4, EAST, (branch + 1) % 4) == (None, True)
+    for same in (branch, (branch + 2) % 4):
+        assert meet([old], EAST, ONE // 4, same) == (None, True)
+        exit_ = beside([old], EAST, ONE // 4, same, [])
+        assert SOUTH < exit_ < ONE and meet([old], EAST, exit_, same) == (None, False)
+        exit_ = beside([old], EAST, ONE // 4, same, [0])
+        assert 2 * ONE < exit_ < WEST
+        assert beside([old], EAST, ONE // 4, same, [0, 2]) == -1
+
+
+def test_the_nearest_chord_is_met_first() -> None:
+    near, far = Chord(SOUTH + 9, WEST - 9, 0, 0, 0, None), Chord(SOUTH, WEST, 0, 1, 0, None)
+    assert meet([far, near], EAST, ONE // 4, 1) == (near, False)
+    assert meet([far, near], ONE // 4, EAST, 3) == (far, False)
+
+
+def test_a_stopped_chord_is_not_behind_its_host() -> None:
+    host = Chord(SOUTH, WEST, 0, 0, 0, None)
+    stopped = Chord(EAST, ONE // 4, 1, 1, 0, host)  # ends on the right of the host; only on paper it goes on
+    assert meet([stopped], ONE // 8, 3 * ONE - 9, 1) == (None, False)
+    assert meet([stopped], ONE - 9, 2 * ONE + 9, 0) == (stopped, False)
 
 
 @pytest.mark.parametrize("h", [0.2, 0.1])

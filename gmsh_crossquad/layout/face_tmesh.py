@@ -17,9 +17,10 @@ import numpy as np
 from ..errors import LayoutError
 from ..field.surface_mesh import SurfaceMesh
 from ..records import AlignedField, Bool, FaceMesh, FaceTMesh, Float, Int
+from .crossing import AROUND, ONE, on_left
 from .patches import Half, Ring, patches
 from .ports import fan
-from .trace import AROUND, ONE, Trace, grow, on_left
+from .trace import Trace, grow
 from .trace_mesh import TraceMesh, trace_mesh
 
 __all__ = ["trace_face"]

