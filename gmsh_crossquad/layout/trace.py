@@ -9,8 +9,8 @@ A trace crosses triangles in straight chords.  Everything is decided by the *ord
 * the spokes of a seed are crossed as its separatrices say (`ports`).
 
 Therefore every patch without a singularity inside has four corners, however coarse or bent the field is (discrete
-Gauss–Bonnet: going around it, the branch turns by four quarters).  Measured on 2,400 random faces with corners down to 3 degrees,
-holes, fragments and given singularities: no patch with another number of corners; one trace without a way on, in a tip of 3 degrees.
+Gauss–Bonnet: going around it, the branch turns by four quarters).  Measured on 2,400 random faces with corners down to
+3 degrees, holes, fragments and given singularities: no patch with another number of corners, one trace without a way on.
 
 References
 ----------
