@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .api import mesh
+    from .block_layout import Block, Edge, Layout
     from .errors import CrossQuadError, GeometryError, InputError, LayoutError, MeshError
     from .options import MeshOptions
     from .quality import Quality
-    from .result import Block, Edge, FaceField, Layout, MeshResult, Singularity
+    from .result import FaceField, MeshResult, Singularity
 
 __version__ = "0.1.0"
 
@@ -33,10 +34,10 @@ _HOME = {
     "MeshError": "errors",
     "MeshOptions": "options",
     "Quality": "quality",
-    "Block": "result",
-    "Edge": "result",
+    "Block": "block_layout",
+    "Edge": "block_layout",
     "FaceField": "result",
-    "Layout": "result",
+    "Layout": "block_layout",
     "MeshResult": "result",
     "Singularity": "result",
 }

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from gmsh_crossquad.cad.files import MeshArrays
-from gmsh_crossquad.check import check_mesh, compare, format_report
+from gmsh_crossquad.check import check_mesh, format_report
+from gmsh_crossquad.compare import compare
 from tests.models import two_materials, two_squares
 from tests.results import two_squares_mesh
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gmsh_crossquad.block_layout import build_layout
 from gmsh_crossquad.errors import MeshError
 from gmsh_crossquad.quality import measure_quality, twins
-from gmsh_crossquad.result import build_layout
 from tests.results import NX, NY, hand_made, two_squares_mesh
 
 UP = np.array([[0.0, 0.0, 1.0]] * 2)

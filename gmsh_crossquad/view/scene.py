@@ -18,7 +18,8 @@ from ..field.surface_mesh import SurfaceMesh
 from ..records import Float, Int
 
 if TYPE_CHECKING:
-    from ..result import FaceField, Layout, MeshResult
+    from ..block_layout import Layout
+    from ..result import FaceField, MeshResult
 
 __all__ = ["Lines", "Markers", "Panel", "Scene", "build_scene"]
 
