@@ -179,6 +179,16 @@ def test_normal_is_that_of_gmsh_triangles_built_in(loop, plane):
     check_normals()
 
 
+@pytest.mark.parametrize("first", range(8))
+@pytest.mark.parametrize("turn", [1, -1])
+def test_normal_of_a_non_convex_face(first, turn):
+    points = [(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)]
+    loop = [(first + k) % 8 for k in range(8)][::turn]
+    hole = [8, 9, 10]
+    built_in([*points, (0.2, 0.2), (2.8, 0.2), (2.8, 0.4)], [loop, hole])
+    check_normals()
+
+
 def test_normal_is_that_of_gmsh_triangles_occ():
     occ = gmsh.model.occ
     box = occ.addBox(0, 0, 0, 1, 2, 3)

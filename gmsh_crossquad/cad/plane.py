@@ -1,8 +1,10 @@
 """The plane of a CAD face and its frame.
 
 The normal is that of the polygon of all boundary samples (Newell's formula, half the sum of p_i x p_{i+1}), exact in
-the coordinate planes; where the signed area vanishes (a figure of eight) that of the best fitting plane.  It is turned
-to the side of Gmsh's own normal, which is also the side of Gmsh's triangles.
+the coordinate planes; where the signed area vanishes (a figure of eight) that of the best fitting plane.  Its side is
+that of Gmsh's triangles: for the built-in kernel the one that the direction of the boundary gives (there `getNormal` may
+be on the other side), for OpenCASCADE the one of `getNormal` (there the boundary of a reversed face runs the other way),
+for a discrete face the one of its mesh.
 """
 
 from __future__ import annotations
@@ -55,9 +57,9 @@ def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> 
     kind = gmsh.model.getType(2, tag)
     if kind != "Plane":
         _check_flat(tag, np.concatenate([points, (_inside(tag, kind) - origin) / scale]), normal, origin, scale)
-    cad = _cad_normal(tag, kind)
-    if cad is not None and abs(cad @ normal) > 0.5 * np.linalg.norm(cad):
-        normal = normal if cad @ normal > 0 else -normal
+    side = _side(tag, kind)
+    if side is not None and side @ normal < 0:
+        normal = -normal
     return centre - ((centre - points.mean(0)) @ normal) * normal, _axes(normal)
 
 
@@ -106,17 +108,18 @@ def _inside(tag: int, kind: str) -> Float:
     return points[inside & finite] if (inside & finite).any() else points[finite]
 
 
-def _cad_normal(tag: int, kind: str) -> Float | None:
-    """Gmsh's normal of a face, None where it has none (the direction of the boundary then decides)."""
+def _side(tag: int, kind: str) -> Float | None:
+    """A vector on the side of a face that its mesh shows; None where the direction of its boundary tells."""
     if kind.startswith("Discrete"):
         return _triangle_normal(tag)
+    if (2, tag) not in gmsh.model.occ.getEntities(2):
+        return None
     with gmsh_errors("evaluating the normal of", entity=(2, tag)):
         lo, hi = gmsh.model.getParametrizationBounds(2, tag)
-        normal = np.asarray(gmsh.model.getNormal(tag, 0.5 * (np.asarray(lo) + np.asarray(hi))))
-    return normal if normal.shape == (3,) and np.isfinite(normal).all() and normal.any() else None
+        return np.asarray(gmsh.model.getNormal(tag, 0.5 * (np.asarray(lo) + np.asarray(hi))))
 
 
-def _triangle_normal(tag: int) -> Float | None:
+def _triangle_normal(tag: int) -> Float:
     """Sum of the area vectors of the mesh of a discrete face."""
     total = np.zeros(3)
     types, _, nodes = gmsh.model.mesh.getElements(2, tag)
@@ -124,4 +127,4 @@ def _triangle_normal(tag: int) -> Float | None:
         corners = node.reshape(-1, gmsh.model.mesh.getElementProperties(int(kind))[3])[:, :3]
         where = np.array([gmsh.model.mesh.getNode(int(n))[0] for n in corners.ravel()]).reshape(-1, 3, 3)
         total += np.cross(where[:, 1] - where[:, 0], where[:, 2] - where[:, 0]).sum(0)
-    return total if total.any() else None
+    return total
