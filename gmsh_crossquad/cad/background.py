@@ -18,12 +18,15 @@ from ..options import MeshOptions
 from ..records import FaceMesh, Float, Int, Model
 from . import session
 from .bounds import kept_bounds
+from .crossings import crossings, without_crossings
 from .outline import Outline, outline
 from .spacing import curve_spacing, face_sizes
 from .tangents import end_directions
 from .triangulate import OPTIONS, triangulate
 
 __all__ = ["background_meshes", "face_meshes"]
+
+CROSSING_ROUNDS = 6
 
 
 def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...]:
@@ -65,7 +68,7 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
     MeshError
         Where a face cannot be triangulated.
     """
-    shapes = [outline(model, row, spacing) for row in range(len(model.faces))]
+    shapes = _outlines(model, spacing)
     with kept_bounds(), session.options(**OPTIONS):
         made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
     # everything that follows is done for all faces together
@@ -100,6 +103,27 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
         mesh = SurfaceMesh(points[mine], local[triangles[triangle_owner == row]])
         out.append(_face_mesh(model, row, shape, mesh, inside))
     return tuple(out)
+
+
+def _outlines(model: Model, spacing: tuple[Float, ...]) -> list[Outline]:
+    """Outlines of all faces; curves whose segments cross others get more nodes."""
+    rows = range(len(model.faces))
+    shapes = [outline(model, row, spacing) for row in rows]
+    for round_ in range(CROSSING_ROUNDS + 1):
+        bad = [(shape, pairs) for shape, pairs in ((shape, crossings(shape)) for shape in shapes) if len(pairs)]
+        if not bad:
+            return shapes
+        if round_ == CROSSING_ROUNDS:
+            break
+        for shape, pairs in bad:
+            spacing = without_crossings(spacing, shape, pairs)
+        shapes = [outline(model, row, spacing) for row in rows]
+    shape, pairs = bad[0]
+    face = model.faces[next(row for row in rows if shapes[row] is shape)]
+    tags = sorted({model.curves[c].tag for c in shape.curve[pairs[0]]})
+    place = model.origin + model.scale * face.world(shape.points[shape.segments[pairs[0, 0], :1]])[0]
+    what = f"curve {tags[0]} crosses itself" if len(tags) == 1 else f"curves {tags[0]} and {tags[1]} cross"
+    raise MeshError(what, entity=(2, face.tag), location=place, remedy="give them a common point there, or move them apart")
 
 
 def _face_mesh(model: Model, row: int, shape: Outline, mesh: SurfaceMesh, source: Int) -> FaceMesh:

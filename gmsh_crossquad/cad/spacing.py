@@ -25,6 +25,7 @@ __all__ = ["curve_spacing", "face_sizes"]
 
 DIVISIONS, FEW_DIVISIONS = 40.0, 16.0  # of a face's diameter in a model of up to MANY faces, and of very many
 MANY = 10
+DIRECTIONS = np.stack([np.cos(np.pi / 16 * np.arange(16)), np.sin(np.pi / 16 * np.arange(16))], axis=1)  # to measure diameters
 TRIANGLES, FACE_TRIANGLES = 3000.0, 100.0  # wanted in the model, and at least in a face, where there are many
 GROWTH = 0.3
 TURN, TURN_SMALL = np.radians(12.0), np.radians(22.5)  # per segment: usually, and where segments are small anyway
@@ -59,14 +60,15 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
     divisions = max(FEW_DIVISIONS, DIVISIONS * min(1.0, float(np.sqrt(MANY / max(1, len(model.faces))))))
     wanted = max(FACE_TRIANGLES, TRIANGLES / len(model.faces))
     for row, face in enumerate(model.faces):
-        area, low, high = 0.0, np.full(2, np.inf), np.full(2, -np.inf)
+        area, low, high = 0.0, np.full(len(DIRECTIONS), np.inf), np.full(len(DIRECTIONS), -np.inf)
         for loop in face.loops:
             for c, sign in loop:
                 xy = face.local(model.curves[c].points)
                 x, y = xy.T
                 area += 0.5 * sign * float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))
-                low, high = np.minimum(low, xy.min(axis=0)), np.maximum(high, xy.max(axis=0))
-        diameter = float(np.linalg.norm(high - low))
+                along = xy @ DIRECTIONS.T
+                low, high = np.minimum(low, along.min(axis=0)), np.maximum(high, along.max(axis=0))
+        diameter = float((high - low).max())
         even = np.sqrt(2.3 * abs(area) / wanted)
         out[row] = max(diameter / divisions, min(diameter / 8.0, even))
     return out * options.background
