@@ -35,7 +35,7 @@ CORNER = 0.5  # spacing at sharp and re-entrant corners over that elsewhere
 TIP = 0.35
 SHARP, REENTRANT = np.radians(60.0), np.radians(200.0)
 ROUNDS = 6
-WANTED_NODES, MAX_NODES = 2_000.0, 5_000.0  # beyond the least numbers of the curves
+WANTED_NODES, MAX_NODES = 2_000.0, 4_000.0  # beyond the least numbers of the curves
 WIDE_GAP = 2.0  # spacing over gap that is accepted to have no more than the wanted nodes
 SHORT = 0.4  # length over face size of a curve that may be a single segment
 STRAIGHT = np.radians(25.0)  # greatest bend at its ends
@@ -114,7 +114,8 @@ def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None
             if nodes <= budget or (factor >= WIDE_GAP * options.background and nodes <= MAX_NODES + budget):
                 break
             factor *= 1.5
-        if round_ + 1 == ROUNDS or (cells.length <= 1.2 * h).all():
+        crowded = round_ > 0 and factor > WIDE_GAP * options.background  # gaps are not resolved: no need to know them better
+        if crowded or round_ + 1 == ROUNDS or (cells.length <= 1.2 * h).all():
             break
         s, curve = _divide(track, cells, h / 1.3, least)
         cells = track.cells(s, curve)
