@@ -100,6 +100,30 @@ def test_shared_curve_has_the_same_nodes_on_both_sides(backgrounds):
     assert len(nodes[0]) > 8
 
 
+def doubled_crack():
+    """A square with a crack from its right side to its centre that is drawn twice, with a vertex of each lip at its mouth."""
+    v = [(0, 0), (2, 0), (2, 1), (2, 1), (2, 2), (0, 2), (1, 1)]
+    ends = [(0, 1), (1, 2), (2, 6), (6, 3), (3, 4), (4, 5), (5, 0)]
+    curves = [(a, b, models.line(v[a], v[b])) for a, b in ends]
+    return models.build(v, curves, [([[(i, 1) for i in range(7)]], [], [])])
+
+
+def test_crack_that_is_drawn_twice():
+    model = doubled_crack()
+    with guest():
+        (m,) = background_meshes(model, MeshOptions())
+    mesh = SurfaceMesh(m.points, m.triangles)
+    assert mesh.euler == 1
+    assert mesh.area.sum() * model.scale**2 == pytest.approx(4.0)
+    corner = np.isfinite(m.opening_angle)
+    angles = dict(zip(m.vertex[corner].tolist(), np.degrees(m.opening_angle[corner]).tolist()))
+    assert angles == pytest.approx({0: 90, 1: 90, 2: 90, 3: 90, 4: 90, 5: 90, 6: 360})
+    # every lip has its own side: the second vertex of the mouth is above the crack
+    for vertex, curve, step in ((2, 2, 0), (3, 3, 1)):
+        (point,) = np.flatnonzero(m.vertex == vertex)
+        assert m.boundary_curve[m.boundary[:, step] == point] == [curve]
+
+
 def test_embedded_point_is_a_port_inside():
     model = models.polygon([(0, 0), (1, 0), (1, 1), (0, 1)], embedded_points=[(0.3, 0.4)])
     with guest():

@@ -19,6 +19,7 @@ from ..records import FaceMesh, Float, Int, Model
 from . import session
 from .bounds import kept_bounds
 from .crossings import crossings, without_crossings
+from .lips import coincident, merged, mirrored
 from .outline import Outline, outline
 from .spacing import curve_spacing, face_sizes
 from .tangents import end_directions
@@ -68,7 +69,7 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
     MeshError
         Where a face cannot be triangulated.
     """
-    shapes = _outlines(model, spacing)
+    whole, shapes, merges = _outlines(model, spacing)
     with kept_bounds(), session.options(**OPTIONS):
         made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
     # everything that follows is done for all faces together
@@ -96,41 +97,47 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
     order = np.argsort(owner, kind="stable")
     local = np.empty(len(points), np.int64)
     bounds = np.searchsorted(owner[order], np.arange(len(shapes) + 1))
-    for row, shape in enumerate(shapes):
+    for row in range(len(shapes)):
         mine = order[bounds[row] : bounds[row + 1]]
         local[mine] = np.arange(len(mine))
         inside = np.where(source[mine] >= 0, source[mine] - offset[row], -1)
         mesh = SurfaceMesh(points[mine], local[triangles[triangle_owner == row]])
-        out.append(_face_mesh(model, row, shape, mesh, inside))
+        out.append(_face_mesh(model, row, whole[row], merges[row], mesh, inside))
     return tuple(out)
 
 
-def _outlines(model: Model, spacing: tuple[Float, ...]) -> list[Outline]:
-    """Outlines of all faces; curves whose segments cross others get more nodes."""
-    rows = range(len(model.faces))
-    shapes = [outline(model, row, spacing) for row in rows]
-    for round_ in range(CROSSING_ROUNDS + 1):
-        bad = [(shape, pairs) for shape, pairs in ((shape, crossings(shape)) for shape in shapes) if len(pairs)]
-        if not bad:
-            return shapes
-        if round_ == CROSSING_ROUNDS:
-            break
-        for shape, pairs in bad:
+def _outlines(model: Model, spacing: tuple[Float, ...]) -> tuple[list[Outline], list[Outline], list[Int]]:
+    """Outlines of all faces, whole and merged, with the merged points; curves whose segments cross others get more nodes."""
+    doubled = coincident(model)
+    bad: list[tuple[int, Outline, Int]] = []
+    for _ in range(CROSSING_ROUNDS + 1):
+        for _, shape, pairs in bad:
             spacing = without_crossings(spacing, shape, pairs)
-        shapes = [outline(model, row, spacing) for row in rows]
-    shape, pairs = bad[0]
-    face = model.faces[next(row for row in rows if shapes[row] is shape)]
+        whole = [outline(model, row, mirrored(model, spacing, doubled)) for row in range(len(model.faces))]
+        shapes, merges = zip(*(merged(shape, doubled) for shape in whole), strict=True)
+        found = [(row, shape, crossings(shape)) for row, shape in enumerate(shapes)]
+        bad = [item for item in found if len(item[2])]
+        if not bad:
+            return whole, list(shapes), list(merges)
+    row, shape, pairs = bad[0]
+    face = model.faces[row]
     tags = sorted({model.curves[c].tag for c in shape.curve[pairs[0]]})
     place = model.origin + model.scale * face.world(shape.points[shape.segments[pairs[0, 0], :1]])[0]
     what = f"curve {tags[0]} crosses itself" if len(tags) == 1 else f"curves {tags[0]} and {tags[1]} cross"
     raise MeshError(what, entity=(2, face.tag), location=place, remedy="give them a common point there, or move them apart")
 
 
-def _face_mesh(model: Model, row: int, shape: Outline, mesh: SurfaceMesh, source: Int) -> FaceMesh:
-    """The record of one face; `source` are the points of the triangulation that its points came from, or -1."""
-    known = (source >= 0) & (source < len(shape.vertex))
-    vertex = np.where(known, shape.vertex[np.where(known, source, 0)], -1)
-    boundary, curve, arclength = _boundary(mesh, shape, source, model.faces[row].tag)
+def _face_mesh(model: Model, row: int, shape: Outline, point: Int, mesh: SurfaceMesh, source: Int) -> FaceMesh:
+    """The record of one face.
+
+    `point` are the points of the triangulation that the points of the outline became, `source` those that the points of the
+    mesh came from, or -1.
+    """
+    boundary, curve, arclength, start = _boundary(mesh, shape, point, source, model.faces[row].tag)
+    vertex = np.full(len(mesh.points), -1)
+    for inner in shape.embedded_points:
+        vertex[source == point[inner]] = shape.vertex[inner]
+    vertex[boundary[:, 0]] = shape.vertex[start]
     angle = _opening_angles(model, row, mesh, boundary, curve, arclength, vertex)
     asked = (vertex >= 0) & model.vertex_ports[np.maximum(vertex, 0)]
     smooth = np.abs(angle - np.pi) < np.pi / 4
@@ -147,20 +154,23 @@ def _face_mesh(model: Model, row: int, shape: Outline, mesh: SurfaceMesh, source
     )
 
 
-def _boundary(mesh: SurfaceMesh, shape: Outline, source: Int, tag: int) -> tuple[Int, Int, Float]:
-    """Boundary half-edges with their curve and the arc lengths at their ends."""
+def _boundary(mesh: SurfaceMesh, shape: Outline, point: Int, source: Int, tag: int) -> tuple[Int, Int, Float, Int]:
+    """Boundary half-edges with their curve, the arc lengths at their ends, and the outline's points at which they start."""
+    rows = np.concatenate([rows for rows, _ in shape.loops] + [shape.embedded, shape.embedded])
+    sides = [signs for _, signs in shape.loops] + [np.full(len(shape.embedded), side) for side in (1, -1)]
+    forward = np.concatenate(sides) > 0
+    ends = np.where(forward[:, None], shape.segments[rows], shape.segments[rows][:, ::-1])
+    n = len(shape.points)
+    key = point[ends[:, 0]] * n + point[ends[:, 1]]
+    order = np.argsort(key)
     half = mesh.half_edges[np.sort(mesh.edge_half_edges[mesh.boundary_edge, 0])]
     a, b = source[half].T
-    n = len(shape.points)
-    key = shape.segments.min(axis=1) * n + shape.segments.max(axis=1)
-    order = np.argsort(key)
-    wanted = np.minimum(a, b) * n + np.maximum(a, b)
-    segment = order[np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)]
-    if (np.minimum(a, b) < 0).any() or not np.array_equal(key[segment], wanted):
+    wanted = a * n + b
+    use = order[np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)]
+    if (np.minimum(a, b) < 0).any() or not np.array_equal(key[use], wanted):
         raise MeshError("a boundary edge of the background mesh is on no curve", entity=(2, tag))
-    forward = shape.segments[segment, 0] == a
-    s = shape.arclength[segment]
-    return half, shape.curve[segment], np.where(forward[:, None], s, s[:, ::-1])
+    s = shape.arclength[rows[use]]
+    return half, shape.curve[rows[use]], np.where(forward[use, None], s, s[:, ::-1]), ends[use, 0]
 
 
 def _opening_angles(model: Model, row: int, mesh: SurfaceMesh, boundary: Int, curve: Int, arclength: Float, vertex: Int) -> Float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..records import Float, Int
+from ..records import Bool, Float, Int
 from .outline import Outline
 
 __all__ = ["crossings", "without_crossings"]
@@ -40,7 +40,7 @@ def crossings(shape: Outline) -> Int:
     return np.concatenate(found)
 
 
-def _sides(p: Float, q: Float, a: Float, b: Float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _sides(p: Float, q: Float, a: Float, b: Float) -> Bool:
     """Are a and b on different sides of the lines through p and q (or on them)?"""
     d = q - p
     left = np.sign(d[:, 0] * (a - p)[:, 1] - d[:, 1] * (a - p)[:, 0])

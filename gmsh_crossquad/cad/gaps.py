@@ -17,6 +17,7 @@ from .cells import Cells
 
 __all__ = ["Neighbours", "Uses", "neighbours"]
 
+TOUCHING = 1e-9  # of the model
 FOLD = 0.55  # an edge shorter than this part of the boundary between its ends is no neighbour along the boundary
 
 
@@ -160,6 +161,8 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
     facing = inward & ((loop[i] != loop[j]) | (size < FOLD * along))
     gap = np.full(len(i), np.inf)
     gap[facing] = _segment_distance(a[i[facing]], b[i[facing]], a[j[facing]], b[j[facing]])
+
+    gap[gap < TOUCHING] = np.inf  # a vertex in common, or the lips of a crack
 
     ends = np.array([(c.start, c.end) for c in model.curves])
     ends = np.concatenate([ends[cells.curve], np.repeat(np.arange(len(model.vertices))[:, None], 2, axis=1)])
