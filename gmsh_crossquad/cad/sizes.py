@@ -28,7 +28,7 @@ __all__ = ["SizeMap", "target_sizes"]
 
 TRIAL = 32.0
 MEASURED_EDGES = 100_000.0
-MEASURED_ELEMENTS = 6000  # of the coarsened surface mesh
+MEASURED_ELEMENTS = 3000  # of the coarsened surface mesh
 KEPT_OPTIONS = {"Mesh.ElementOrder": 1, "Mesh.MeshOnlyVisible": 0, "Mesh.MeshOnlyEmpty": 0}
 
 
