@@ -3,8 +3,9 @@
 Around an interior vertex of index q (quarter turns) the cross turns against the polar angle by ``V pi/2`` with
 ``V = 4 - q``; around a boundary vertex ``n_q = 2 - q`` quads fill the sector.  With the polar angle ``a`` scaled to the
 total angle ``A`` of the star, the cross relative to the ray is ``g(a) = g0 - V (pi/2) a / A``, and a separatrix leaves where
-``g(a)`` is a multiple of pi/2: V equally spaced rays, `g0` by least squares over the edge midpoints of the star.  On the boundary
-both ends of the sector are given and the rays are ``j A / n_q``.
+``g(a)`` is a multiple of pi/2: V equally spaced rays, `g0` by least squares over the edge midpoints of the star.  On the
+boundary both ends of the sector are given and the rays are ``j A / n_q``.  Where the field is not like that (another seed is
+only a few edges away) the rays are where the values at the midpoints, interpolated, pass the multiples of pi/2.
 
 Which ray belongs to which branch of the cross follows from counting around the star, not from comparing angles.
 """
@@ -20,6 +21,9 @@ from .step import CLEAR
 from .trace_mesh import QUARTER, TraceMesh, next_of, previous_of
 
 __all__ = ["Fan", "Port", "fan"]
+
+EVEN = 0.25
+"""Greatest misfit, in radians, of a field that counts as evenly spread around a seed."""
 
 SLIDE = 0.02
 """Fraction of an edge next to a vertex where a direction along the boundary passes."""
@@ -79,12 +83,24 @@ def fan(mesh: TraceMesh, h: int, index: int) -> Fan:
             f"the field does not have index {index}/4 at this vertex", location=where, remedy="align the field first"
         )
     slope = count * QUARTER / total
+    samples = _samples(mesh, star, polar, offset)
     if boundary:
-        rays = [(j * total / count, j) for j in range(1, count)]
+        g0, low, high = 0.0, 1, count
+        samples = [*samples, (total, -count * QUARTER)]
     else:
-        g0 = _fit(mesh, star, polar, branch, offset, slope)
+        g0 = (
+            sum(g + slope * angle for angle, g in samples[::2]) + 2.0 * sum(g + slope * angle for angle, g in samples[1::2])
+        ) / (1.5 * len(samples))
         low = ceil(-g0 / QUARTER)
-        rays = [((g0 + j * QUARTER) / slope, j) for j in range(low, low + count)]
+        high = low + count
+    if max(abs(g + slope * angle - g0) for angle, g in samples) < EVEN:
+        rays = [((g0 + j * QUARTER) / slope, j) for j in range(low, high)]
+    elif boundary:
+        rays = [(_where(samples, -j * QUARTER), j) for j in range(low, high)]
+    else:
+        around = samples + [(angle + total, g - count * QUARTER) for angle, g in samples[:1]]
+        low = ceil(-samples[0][1] / QUARTER)
+        rays = [(_where(around, -j * QUARTER), j) for j in range(low, low + count)]
     placed = _place(mesh, star, polar, branch, rays)
     return Fan(_ports(mesh, star, branch, placed, count), _gates(mesh, star, branch, placed, count))
 
@@ -107,8 +123,6 @@ def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], 
         if i:
             branch.append((branch[-1] + mesh.shift[previous_of(star[i - 1])]) % 4)
         own = 0.5 * (mesh.value[h] + mesh.value[n]) + branch[i] * QUARTER - spoke + polar[i]
-        if i == 0:
-            direction = own
         turns = round((direction - own) / (2.0 * pi))
         offset.append(own + 2.0 * pi * turns - polar[i])
         direction = own + 2.0 * pi * turns + 0.5 * (mesh.value[p] - mesh.value[n])
@@ -116,17 +130,26 @@ def _develop(mesh: TraceMesh, star: list[int]) -> tuple[list[float], list[int], 
     return polar, branch, offset
 
 
-def _fit(mesh: TraceMesh, star: list[int], polar: list[float], branch: list[int], offset: list[float], slope: float) -> float:
-    """Least-squares ``g0`` in ``g(a) = g0 - slope a`` over spokes and opposite edges (twice the weight)."""
-    total, weight = 0.0, 0
+def _samples(mesh: TraceMesh, star: list[int], polar: list[float], offset: list[float]) -> list[tuple[float, float]]:
+    """Polar angle and ``g`` at the middles of the spokes and of the rim edges in turn."""
+    out = []
     for i, h in enumerate(star):
         n, p = next_of(h), previous_of(h)
         mx, my = 0.5 * (mesh.x[n] + mesh.x[p]) - mesh.x[h], 0.5 * (mesh.y[n] + mesh.y[p]) - mesh.y[h]
         inside = atan2(mesh.ex[h] * my - mesh.ey[h] * mx, mesh.ex[h] * mx + mesh.ey[h] * my)
-        opposite = offset[i] + 0.5 * (mesh.value[p] - mesh.value[h]) - inside
-        total += offset[i] + slope * polar[i] + 2.0 * (opposite + slope * (polar[i] + inside))
-        weight += 3
-    return total / weight
+        out.append((polar[i], offset[i]))
+        out.append((polar[i] + inside, offset[i] + 0.5 * (mesh.value[p] - mesh.value[h]) - inside))
+    return out
+
+
+def _where(samples: list[tuple[float, float]], level: float) -> float:
+    """Polar angle where ``g``, made monotone, falls to `level`."""
+    (at, g) = samples[0]
+    for angle, value in samples[1:]:
+        if value <= level:
+            return at + (angle - at) * (g - level) / (g - value) if g > level else at
+        at, g = angle, min(g, value)
+    return samples[-1][0]
 
 
 def _place(
