@@ -109,3 +109,15 @@ def test_size_map_on_hand_made_model():
     model = models.two_materials()
     sizes = target_sizes(model, models.background(model, 0.05), MeshOptions(size=0.1))
     assert sizes.at_face(1, np.zeros((2, 2))) == pytest.approx(0.1 / np.sqrt(2))
+
+
+def test_periodic_curves_and_a_mesh_of_the_user(square):
+    shift = [1, 0, 0, 10, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
+    gmsh.model.mesh.setPeriodic(1, [2], [4], shift)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 1.0)
+    gmsh.model.mesh.generate(2)
+    for _ in range(2):
+        model, meshes, sizes = measured()
+        np.testing.assert_allclose(sizes.at_face(0, meshes[0].points) * model.scale, 1.0, rtol=0.02)
+    gmsh.model.mesh.generate(2)  # the mesher still works
+    assert len(gmsh.model.mesh.getNodes()[0]) > 100

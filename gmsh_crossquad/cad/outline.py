@@ -65,8 +65,7 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...]) -> Outline:
     point_of = {v: i for i, v in enumerate(vertex.tolist())}
     world, segments, curve, arclength = [model.vertices[vertex]], [], [], []
     rows: dict[int, Int] = {}
-    n_points = n_segments = 0
-    n_points = len(vertex)
+    n_points, n_segments = len(vertex), 0
     for c in used:
         record, s = model.curves[c], spacing[c]
         inner = n_points + np.arange(len(s) - 2)

@@ -29,7 +29,8 @@ __all__ = ["SizeMap", "target_sizes"]
 TRIAL = 32.0
 MEASURED_EDGES = 100_000.0
 MEASURED_ELEMENTS = 3000  # of the coarsened surface mesh
-KEPT_OPTIONS = {"Mesh.ElementOrder": 1, "Mesh.MeshOnlyVisible": 0, "Mesh.MeshOnlyEmpty": 0}
+# An error that Gmsh throws while it meshes leaves its mesher locked for the rest of the session: errors are looked for instead.
+KEPT_OPTIONS = {"General.AbortOnError": 0, "Mesh.ElementOrder": 1, "Mesh.MeshOnlyVisible": 0, "Mesh.MeshOnlyEmpty": 0}
 
 
 @dataclass(frozen=True)
@@ -129,6 +130,8 @@ def _measured(model: Model, meshes: tuple[FaceMesh, ...]) -> SizeMap:
     snapshot = session.MeshSnapshot.take()
     try:
         with session.options(**KEPT_OPTIONS):
+            if not any(gmsh.model.getType(*entity).startswith("Discrete") for entity in gmsh.model.getEntities()):
+                gmsh.model.mesh.clear()  # a mesh that was put back has lost what it knew about periodic curves
             curve = _measured_curves(model)
             if len(gmsh.model.mesh.field.list()):
                 face = _field_sizes(model, meshes, curve)
