@@ -82,7 +82,7 @@ def _check_written(path: str | os.PathLike[str]) -> None:
             os.fsync(file.fileno())
     except OSError as error:
         raise MeshError(f"the mesh could not be written ({error.strerror})", remedy="free some space on the disk") from None
-    if size == 0 or (Path(path).suffix.lower().startswith(".msh") and b"$End" not in tail):
+    if size == 0 or (Path(path).suffix.lower().startswith(".msh") and b"$end" not in tail.lower()):
         raise MeshError("the mesh file was not written in full", remedy="free some space on the disk")
 
 
