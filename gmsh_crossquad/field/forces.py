@@ -12,7 +12,6 @@ which never looks at the core and is one sum over the vertices.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..records import Float
 from .surface_mesh import SurfaceMesh
@@ -57,7 +56,9 @@ def forces(mesh: SurfaceMesh, rotation: Float, positions: Float, reach: Float) -
     nodal = [np.bincount(opposite, part[..., c].ravel(), len(mesh.points)) for c in range(2)]
     force = np.stack(nodal, axis=1)
     out = np.zeros((len(positions), 2))
-    for k, near in enumerate(cKDTree(mesh.points).query_ball_point(positions, reach, return_sorted=True)):
-        away = np.hypot(*(mesh.points[near] - positions[k]).T)
-        out[k] = np.minimum((reach[k] - away) / (0.7 * reach[k]), 1.0) @ force[near]
+    for k, radius in enumerate(reach.tolist()):
+        x, y = (mesh.points - positions[k]).T
+        square = x * x + y * y
+        near = np.flatnonzero(square < radius * radius)
+        out[k] = np.minimum((radius - np.sqrt(square[near])) / (0.7 * radius), 1.0) @ force[near]
     return out
