@@ -105,7 +105,7 @@ def free_edges(mesh: MeshArrays) -> Int:
 
 def _hanging(points: Float, edges: Int, touch: float) -> int:
     """Free edges that another free edge's node lies on, or that coincide with another one over duplicate nodes."""
-    from scipy.spatial import cKDTree
+    from .spatial import cKDTree
 
     if not len(edges):
         return 0

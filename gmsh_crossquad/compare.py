@@ -38,7 +38,7 @@ def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[i
     -------
     Report
     """
-    from scipy.spatial import cKDTree
+    from .spatial import cKDTree
 
     faults = list(report.faults)
     used = np.unique(np.concatenate([mesh.quads.ravel(), mesh.triangles.ravel()]))
@@ -110,7 +110,7 @@ def _loose_edges(points: Float, edges: Int, model: Model) -> int:
 
 def _distance(points: Float, a: Float, b: Float) -> Float:
     """Distance of points (n, 3) from the segments a-b, each cut into pieces short enough for a nearest-neighbour search."""
-    from scipy.spatial import cKDTree
+    from .spatial import cKDTree
 
     length = np.linalg.norm(b - a, axis=1)
     pieces = np.maximum(1, np.ceil(length / 0.01).astype(np.int64))

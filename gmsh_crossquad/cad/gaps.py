@@ -102,7 +102,7 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
     cells : Cells
     uses : Uses
     """
-    from scipy.spatial import Delaunay
+    from ..spatial import Delaunay
 
     count = np.diff(cells.first)
     use = np.repeat(np.arange(len(uses.curve)), count[uses.curve])

@@ -31,7 +31,7 @@ class SizeField:
     """
 
     def __init__(self, points: Float, sizes: Float, h_max: float) -> None:
-        from scipy.spatial import cKDTree
+        from ..spatial import cKDTree
 
         tree = cKDTree(points)
         k = min(NEIGHBOURS, len(points))

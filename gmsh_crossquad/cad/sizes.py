@@ -70,7 +70,7 @@ class SizeMap:
         if self.constant is not None:
             return np.full(len(points), self.constant)
         if row not in self._trees:
-            from scipy.spatial import cKDTree
+            from ..spatial import cKDTree
 
             self._trees[row] = cKDTree(self.meshes[row].points)
         return self.face[row][self._trees[row].query(points)[1]]
@@ -238,7 +238,7 @@ def _extended(model: Model, mesh: FaceMesh, curve: tuple[Float, ...]) -> Float:
 
 def _field_sizes(model: Model, meshes: tuple[FaceMesh, ...], curve: tuple[Float, ...]) -> tuple[Float, ...]:
     """Sizes at the points of every background mesh, measured on a surface mesh that Gmsh makes."""
-    from scipy.spatial import cKDTree
+    from ..spatial import cKDTree
 
     guess = sum(
         float(np.sum(_areas(mesh) / (_extended(model, mesh, curve)[mesh.triangles] ** 2).mean(axis=1))) for mesh in meshes

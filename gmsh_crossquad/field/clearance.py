@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from ..records import Float, Int
-from .nearest import nearest
+from ..spatial import cKDTree
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["Clearance"]
@@ -41,6 +41,10 @@ class Clearance:
         return np.concatenate([a, 0.75 * a + 0.25 * b, 0.5 * (a + b), 0.25 * a + 0.75 * b, b])
 
     @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(self._samples)
+
+    @cached_property
     def _size(self) -> Float:
         """(4 b,) radius of the hole that a boundary sample is on, infinite on outer loops."""
         mesh = self.mesh
@@ -55,11 +59,11 @@ class Clearance:
     def _depth(self) -> tuple[Float, Float]:
         """Interior vertices (k, 2) and their distances (k,) from the boundary."""
         inside = self.mesh.points[~self.mesh.boundary_vertex]
-        return inside, nearest(self._samples, inside)[0]
+        return inside, np.asarray(self._tree.query(inside)[0])
 
     def distance(self, points: Float) -> tuple[Float, Float]:
         """(k,) distances from the boundary and (k, 2) unit vectors away from it."""
-        d, i = nearest(self._samples, points)
+        d, i = map(np.asarray, self._tree.query(points))
         away = points - self._samples[i]
         return d, away / np.maximum(d, np.finfo(float).tiny)[:, None]
 
@@ -68,7 +72,7 @@ class Clearance:
         inside, depth = self._depth
         x, y = (points[:, None] - inside[None]).transpose(2, 0, 1)
         rho = np.where(x * x + y * y > (1.5 * depth) ** 2, 0.0, depth).max(axis=1)
-        return np.minimum(0.4 * rho, 0.6 * self._size[nearest(self._samples, points)[1]])
+        return np.minimum(0.4 * rho, 0.6 * self._size[self._tree.query(points)[1]])
 
     def room(self, points: Float) -> Float:
         """(k,) distances to the boundary or half way to the next of the points, whichever is less."""
@@ -92,6 +96,6 @@ class Clearance:
         ratio = 1.0 + 0.4 * spread
         count = int(np.log(max(2.0 * extent / start, 2.0)) / np.log(ratio)) + 1
         t = start * ratio ** np.arange(count)
-        d = nearest(self._samples, origin + t[:, None] * direction)[0]
+        d = self._tree.query(origin + t[:, None] * direction)[0]
         bad = np.flatnonzero(d < 0.8 * spread * t)
         return float(t[max(int(bad[0]) - 1, 0)] if len(bad) else t[-1])

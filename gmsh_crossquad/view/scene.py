@@ -116,7 +116,7 @@ def _crosses(fields: tuple[FaceField, ...], cell: float, frame: Float) -> Float:
     At a point with barycentric coordinates l the fourth power of the cross is ``sum_k (1 - 2 l_opposite(k)) u_k``, from its
     values u_k at the three edges of the triangle (Crouzeix-Raviart interpolation).
     """
-    from scipy.spatial import cKDTree
+    from ..spatial import cKDTree
 
     out = [np.zeros((0, 2, 3))]
     for f in fields:
