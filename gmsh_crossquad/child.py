@@ -171,6 +171,8 @@ def _serve(task: str, job: dict[str, Any], fd: int) -> None:
     """The child's side: run the task, send its events to `fd`."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    for library in ("OPENBLAS", "MKL", "OMP"):  # before NumPy is there: idle threads that spin cost 0.2 s of CPU
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(2 if job.get("verbose") else silence, 1)
     if not job.get("verbose"):
