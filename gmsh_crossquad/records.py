@@ -134,6 +134,8 @@ class Model:
     curves : tuple of Curve
     faces : tuple of Face
         The faces to mesh: those in physical surfaces where there are any, else all.
+    notes : tuple of str
+        What the user should know (defects of the model that were mended).
     """
 
     name: str
@@ -144,6 +146,7 @@ class Model:
     vertex_ports: Bool
     curves: tuple[Curve, ...]
     faces: tuple[Face, ...]
+    notes: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True)

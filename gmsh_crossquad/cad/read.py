@@ -38,6 +38,7 @@ class _Raw:
     ends: list[int]
     parameters: Float
     points: Float
+    untied: bool = False
 
 
 @dataclass
@@ -101,7 +102,9 @@ def read_model(options: MeshOptions) -> Model:
     for r in raw:
         r.parameters, r.points = refine(r.tag, r.kind, r.parameters, r.points, scale)
         if r.kind not in CONVEX and not _degenerate(r, scale):
+            tied = r.points
             r.parameters, r.points = untie(r.parameters, r.points, scale)
+            r.untied = r.points is not tied
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
     kept = [r for r in raw if not _degenerate(r, scale)]
@@ -138,6 +141,7 @@ def read_model(options: MeshOptions) -> Model:
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
         faces=faces,
+        notes=tuple(f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied),
     )
 
 
@@ -188,7 +192,8 @@ def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Cur
     arclength = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(1)))])
     if spacing is not None:
         spacing = np.interp(spacing, raw.parameters, arclength)
-    tangents = cad_tangents(raw.tag, raw.kind, raw.parameters, points)
+    # the CAD's derivative at an end may be that of a loop that was cut off
+    tangents = None if raw.untied else cad_tangents(raw.tag, raw.kind, raw.parameters, points)
     return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing, tangents)
 
 
