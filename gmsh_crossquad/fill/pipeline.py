@@ -25,6 +25,7 @@ __all__ = ["fill", "poor_cells"]
 
 ROUNDS = 6  # of straightening; each halves the bulge and the unevenness
 KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
+SHOWN = 8  # divisions that show what any greater number would
 POOR = 0.05  # guide quads below this are held to this
 
 
@@ -85,7 +86,7 @@ def poor_cells(
     Parameters
     ----------
     model, guide, divisions, evaluate, vertices
-        As for `fill`; 8 divisions show what any greater number would.
+        As for `fill`; of more than `SHOWN` divisions the cells are judged at that many.
 
     Returns
     -------
@@ -93,7 +94,7 @@ def poor_cells(
         Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
         inner edges were straightened.
     """
-    work = _Work.start(model, guide, divisions, evaluate, vertices)
+    work = _Work.start(model, guide, np.minimum(divisions, SHOWN), evaluate, vertices)
     own = work.cells.corner_quality()
     out: Int = np.flatnonzero(work.place(own) < KEEP * np.maximum(own, POOR))
     return out
