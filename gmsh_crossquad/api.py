@@ -52,6 +52,7 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     with guest():
         snapshot = MeshSnapshot.take()
         try:
+            snapshot.clear()
             stages = block_mesh(checked, watch)
             with watch.stage("put"), gmsh_errors("putting the mesh on the model"):
                 put_mesh(stages.model, stages.mesh)

@@ -193,6 +193,11 @@ class MeshSnapshot:
                 )
         return cls(gmsh.model.getCurrent(), tuple(records))
 
+    def clear(self) -> None:
+        """Take the mesh off the model, unless it is the geometry of discrete entities: it need not be kept again and again."""
+        if self.entities and not any(gmsh.model.getType(*entity).startswith("Discrete") for entity in gmsh.model.getEntities()):
+            gmsh.model.mesh.clear()
+
     def restore(self) -> None:
         """Replace the mesh of the model by the one that was taken; the current model stays current."""
         before = gmsh.model.getCurrent()
