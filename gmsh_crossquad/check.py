@@ -2,7 +2,8 @@
 
 By itself: cells, scaled Jacobians against the mean normal of each surface (a cell folded over shows as negative), irregular
 vertices (valence not 4, off the free boundary and off all line elements), and conformity: an edge with a single cell must not
-have nodes of other single-cell edges in its inside (a hanging node), nor lie on another such edge (a crack).
+have nodes of other single-cell edges in its inside (a hanging node), nor lie on another such edge (a crack), unless both are
+on curves of the model that bound one surface: that crack was drawn.
 
 `compare` goes on with the model.
 """
@@ -103,8 +104,25 @@ def free_edges(mesh: MeshArrays) -> Int:
     return np.stack([alone // n, alone % n], axis=1)
 
 
-def _hanging(points: Float, edges: Int, touch: float) -> int:
-    """Free edges that another free edge's node lies on, or that coincide with another one over duplicate nodes."""
+def _lip_surface(mesh: MeshArrays, edges: Int) -> Int:
+    """Surface (k,) of the free edges that are line elements of a curve, -1 for other edges."""
+    out = np.full(len(edges), -1)
+    if not len(mesh.quads):
+        return out
+    n = len(mesh.points)
+    half = np.sort(np.stack([mesh.quads.ravel(), np.roll(mesh.quads, -1, axis=1).ravel()], axis=1), axis=1)
+    key, first = np.unique(half[:, 0] * n + half[:, 1], return_index=True)
+    wanted, line = edges[:, 0] * n + edges[:, 1], np.sort(mesh.lines, axis=1)
+    drawn = np.isin(wanted, line[:, 0] * n + line[:, 1]) & np.isin(wanted, key)
+    out[drawn] = mesh.quad_entity[first[np.searchsorted(key, wanted[drawn])] // 4]
+    return out
+
+
+def _hanging(points: Float, edges: Int, surface: Int, touch: float) -> int:
+    """Free edges that another free edge's node lies on, or that coincide with another one over duplicate nodes.
+
+    Not counted are contacts of lips: edges and nodes with the same `surface` (k,), not -1.
+    """
     from .spatial import cKDTree
 
     if not len(edges):
@@ -122,12 +140,17 @@ def _hanging(points: Float, edges: Int, touch: float) -> int:
     offset = points[node] - a[edge]
     along = np.einsum("kc,kc->k", offset, direction)
     aside = np.linalg.norm(offset - along[:, None] * direction, axis=1)
-    on = (aside < np.maximum(touch, 1e-3 * length[edge])) & (along > 0.01 * length[edge]) & (along < 0.99 * length[edge])
+    low, high = np.full(len(points), np.iinfo(np.int64).max), np.full(len(points), -1)
+    np.minimum.at(low, edges, surface[:, None])
+    np.maximum.at(high, edges, surface[:, None])
+    drawn = (surface[edge] >= 0) & (surface[edge] == low[node]) & (low[node] == high[node])
+    on = ~drawn & (aside < np.maximum(touch, 1e-3 * length[edge])) & (along > 0.01 * length[edge]) & (along < 0.99 * length[edge])
     hanging = np.zeros(len(edges), bool)
     hanging[edge[on]] = True
     mid = cKDTree(0.5 * (a + b))
     for i, j in sorted(mid.query_pairs(touch)):
-        hanging[[i, j]] = True
+        if surface[i] < 0 or surface[i] != surface[j]:
+            hanging[[i, j]] = True
     return int(hanging.sum())
 
 
@@ -158,7 +181,7 @@ def check_mesh(mesh: MeshArrays) -> Report:
     valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
     has_quads = valence > 0
     diagonal = float(np.linalg.norm(np.ptp(mesh.points[used], axis=0))) if len(used) else 0.0
-    hanging = _hanging(mesh.points, free, TOUCH * diagonal)
+    hanging = _hanging(mesh.points, free, _lip_surface(mesh, free), TOUCH * diagonal)
     faults = []
     if not len(mesh.quads):
         faults.append("no quads")

@@ -100,6 +100,22 @@ def test_a_hanging_node_is_a_fault():
     assert report.hanging == 1
 
 
+@pytest.mark.parametrize("drawn, surfaces, hanging", [(True, 1, 0), (False, 1, 2), (True, 2, 2)])
+def test_a_crack_is_conforming_where_the_model_has_it(drawn, surfaces, hanging):
+    # two squares side by side; their common side is there twice, with a line element on both or on none
+    xy = [(0, 0), (1, 0), (1, 1), (0, 1), (1, 0), (2, 0), (2, 1), (1, 1)]
+    lines = np.array([[1, 2], [4, 7]] if drawn else np.zeros((0, 2)), np.int64)
+    mesh = arrays(
+        points=np.c_[np.array(xy, float), np.zeros(8)],
+        quads=np.arange(8).reshape(2, 4),
+        quad_entity=np.array([1, surfaces]),
+        lines=lines,
+        line_entity=np.arange(len(lines)),
+        groups={},
+    )
+    assert check_mesh(mesh).hanging == hanging
+
+
 def test_a_turned_quad_is_a_fault():
     quads = arrays().quads.copy()
     quads[0] = quads[0][::-1]
