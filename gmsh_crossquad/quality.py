@@ -63,11 +63,9 @@ def twins(quads: Int) -> Int:
 def curve_edges(mesh: QuadMesh) -> Int:
     """Row of `curve_nodes` that half-edge ``4 q + i`` (4 q,) of the mesh lies on, -1 elsewhere."""
     n = len(mesh.points)
-    start = mesh.quads.ravel()
-    end = np.roll(mesh.quads, -1, axis=1).ravel()
-    out = np.full(len(start), -1, np.int64)
+    out = np.full(mesh.quads.size, -1, np.int64)
     chains = mesh.curve_nodes
-    if not chains or not len(start):
+    if not chains or not len(out):
         return out
     a = np.concatenate([c[:-1] for c in chains])
     b = np.concatenate([c[1:] for c in chains])
@@ -79,8 +77,11 @@ def curve_edges(mesh: QuadMesh) -> Int:
         return out
     on_curve = np.zeros(n, bool)
     on_curve[a] = on_curve[b] = True
-    candidates = np.flatnonzero(on_curve[start] & on_curve[end])
-    wanted = np.minimum(start, end)[candidates] * n + np.maximum(start, end)[candidates]
+    corner = on_curve[mesh.quads]
+    candidates = np.flatnonzero(corner & np.roll(corner, -1, axis=1))
+    q, i = np.divmod(candidates, 4)
+    start, end = mesh.quads[q, i], mesh.quads[q, (i + 1) % 4]
+    wanted = np.minimum(start, end) * n + np.maximum(start, end)
     place = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
     hit = key[place] == wanted
     out[candidates[hit]] = row[place[hit]]
@@ -93,12 +94,21 @@ def is_conforming(mesh: QuadMesh, on_curve: Bool) -> bool:
     Then each edge is run once in either direction: the sorted keys (face, lower node, higher node) of the half-edges that run
     upwards and of those that run downwards are the same, and none occurs twice.
     """
-    inner = ~on_curve
-    start = mesh.quads.ravel()[inner]
-    end = np.roll(mesh.quads, -1, axis=1).ravel()[inner]
+    start, end = mesh.quads, np.roll(mesh.quads, -1, axis=1)
     n = len(mesh.points)
-    key = (np.repeat(mesh.quad_face, 4)[inner] * n + np.minimum(start, end)) * n + np.maximum(start, end)
-    upwards, downwards = np.sort(key[start < end]), np.sort(key[start >= end])
+    several = bool(len(mesh.quad_face)) and bool((mesh.quad_face != mesh.quad_face[0]).any())
+    inner = ~on_curve.reshape(-1, 4)
+    keys = []
+    for low, high in ((start, end), (end, start)):
+        use = low < high
+        use &= inner
+        key = low[use] * n
+        key += high[use]
+        if several:
+            key += np.repeat(mesh.quad_face * n * n, np.count_nonzero(use, axis=1))
+        key.sort()
+        keys.append(key)
+    upwards, downwards = keys
     return bool(np.array_equal(upwards, downwards) and (upwards[1:] > upwards[:-1]).all())
 
 
@@ -124,7 +134,7 @@ def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     return Quality(
         nodes=len(mesh.points),
         quads=len(mesh.quads),
-        blocks=len(np.unique(mesh.quad_block)),
+        blocks=int(np.count_nonzero(np.bincount(mesh.quad_block))),
         irregular=int((inner & (valence != 4) & (valence > 0)).sum()),
         min_scaled_jacobian=float(value.min(initial=np.inf)),
         p5_scaled_jacobian=float(np.quantile(value, 0.05)),

@@ -21,7 +21,7 @@ from ..records import Float, Guide, Int, Model
 
 __all__ = ["guide_quality", "scaled_jacobian"]
 
-CHUNK = 1 << 16
+CHUNK = 1 << 14
 """Quads per pass: keeps the temporaries of a pass in the cache and the memory bounded for millions of quads."""
 
 
@@ -41,23 +41,28 @@ def scaled_jacobian(points: Float, quads: Int, normals: Float) -> Float:
         In [-1, 1]; 0 where an edge has no length.
     """
     out = np.empty(len(quads))
+    columns = np.ascontiguousarray(points.T)
     for low in range(0, len(quads), CHUNK):
         part = slice(low, low + CHUNK)
-        out[part] = _least_corner(points, quads[part], normals if normals.ndim == 1 else normals[part])
+        out[part] = _least_corner(columns, quads[part], normals if normals.ndim == 1 else normals[part].T)
     return out
 
 
-def _least_corner(points: Float, quads: Int, normals: Float) -> Float:
-    corners = points[quads]
-    edge = np.roll(corners, -1, axis=1) - corners
-    length = np.sqrt(np.einsum("qkc,qkc->qk", edge, edge))
-    back = -np.roll(edge, 1, axis=1)
-    cross = np.cross(edge, back)
-    subscripts = "qkc,c->qk" if normals.ndim == 1 else "qkc,qc->qk"
-    sine = np.einsum(subscripts, cross, normals)
-    scale = length * np.roll(length, 1, axis=1)
-    ratio = np.divide(sine, scale, out=np.zeros_like(sine), where=scale > 0.0)
-    least: Float = ratio.min(axis=1)
+def _least_corner(columns: Float, quads: Int, normals: Float) -> Float:
+    """Coordinate by coordinate, corner by corner: `columns` (3, n), `normals` (3,) or (3, q)."""
+    corner = np.ascontiguousarray(quads.T)
+    edge = np.empty((3, *corner.shape))
+    for c in range(3):
+        x = columns[c].take(corner)
+        np.subtract(x[1:], x[:-1], out=edge[c, :-1])
+        np.subtract(x[0], x[-1], out=edge[c, -1])
+    length = np.sqrt(edge[0] ** 2 + edge[1] ** 2 + edge[2] ** 2)
+    least = np.full(len(quads), np.inf)
+    for k in range(4):
+        (ax, ay, az), (bx, by, bz) = edge[:, k - 1], edge[:, k]
+        sine = normals[0] * (ay * bz - az * by) + normals[1] * (az * bx - ax * bz) + normals[2] * (ax * by - ay * bx)
+        scale = length[k - 1] * length[k]
+        np.minimum(least, np.divide(sine, scale, out=np.zeros_like(sine), where=scale > 0.0), out=least)
     return least
 
 

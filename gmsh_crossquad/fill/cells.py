@@ -1,6 +1,6 @@
 """The guide quads as structured grids: positions inside, quality and fine quads.
 
-Cells of equal size are worked on together, as many as fit the cache.
+Cells of equal size are worked on together, up to `CHUNK` nodes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .skeleton import Frames, Skeleton
 
 __all__ = ["Cells"]
 
-CHUNK = 1 << 14  # grid nodes at a time
+CHUNK = 1 << 16  # grid nodes at a time: fewer calls matter more than the innermost cache
 LONG = 64  # rows from which a slice is faster than an index array
 
 # corner where each side starts and ends when it runs with u or v

@@ -3,7 +3,7 @@
     S(i, j) = (1 - v_j) bottom_i + v_j top_i + (1 - u_i) left_j + u_i right_j - bilinear(u_i, v_j)
 
 with u_i the mean of the relative arc lengths at node i of bottom and top, weighted by their lengths, and v_j likewise: the
-rule of Gmsh's transfinite mesher, to rounding.  Grids of equal size are done together, in pieces that fit the cache.
+rule of Gmsh's transfinite mesher, to rounding.  Grids of equal size are done together.
 """
 
 from __future__ import annotations
