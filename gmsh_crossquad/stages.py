@@ -39,7 +39,10 @@ __all__ = ["StagesResult", "Watch", "block_mesh"]
 
 GUIDE_QUADS = 700
 BACKGROUNDS = (1.0, 0.7, 0.5)
-ROUNDS = 3
+ROUNDS = 4
+BLOCK_SIZES = 4
+OVERLONG = 2.0
+SHORT_CURVES = 0.4
 
 
 @dataclass
@@ -120,13 +123,9 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         tmesh = glue(model, meshes, tmeshes)
         size = _arc_sizes(model, tmesh, sizes)
     area = sum(float(_area(m)) for m in meshes)
-    block = np.maximum(options.block_size * size, np.sqrt(area) / 12)
-    with watch.stage("quantize"):
-        coarse = quantize(model, tmesh, tmesh.length / block).divisions
-        wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
-        if wrong:
-            raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
-    guide, fine = _smooth_guide(model, tmesh, coarse, size, float(np.sqrt(area / GUIDE_QUADS)), watch, notes)
+    guide_size = float(np.sqrt(area / GUIDE_QUADS))
+    coarse = _quantized(model, tmesh, size, np.maximum(options.block_size * size, np.sqrt(area) / 12), guide_size, watch)
+    guide, fine = _smooth_guide(model, tmesh, coarse, size, guide_size, watch, notes)
     with watch.stage("fill"):
         mesh = fill(model, guide, fine, _evaluator(model), vertex_points(model))
     mesh = replace(mesh, notes=(*notes, *mesh.notes))
@@ -200,6 +199,34 @@ def _arc_sizes(model: Model, tmesh: TMesh, sizes: SizeMap) -> Float:
             rows = np.unique((quarter * (len(line) - 1)).round().astype(int))
             out[arc] = float(np.mean(sizes.at_face(f, model.faces[f].local(line[rows]))))
     return out
+
+
+def _quantized(model: Model, tmesh: TMesh, size: Float, block: Float, guide_size: float, watch: Watch) -> Int:
+    """Coarse divisions of the arcs: as few blocks as the sizes allow.
+
+    Where short curves keep the chords of large blocks from being divided, smaller blocks leave the short curves alone.
+    """
+    with watch.stage("quantize"):
+        best: tuple[float, Int] | None = None
+        usual = float(np.median([curve.length for curve in model.curves]))
+        while usual < SHORT_CURVES * block.mean() and (block > size).any():
+            block = np.maximum(0.5 * block, size)
+        for _ in range(BLOCK_SIZES):
+            coarse = quantize(model, tmesh, tmesh.length / block).divisions
+            wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
+            if wrong:
+                raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
+            chords = find_chords(tmesh, quotient(tmesh, coarse))
+            longest = chord_divisions(model, tmesh, coarse, chords, np.maximum(size, guide_size), guide_size).longest
+            if best is None or longest < 0.8 * best[0]:
+                best = longest, coarse
+            if longest < OVERLONG:
+                break
+            if (block <= size).all():
+                break
+            block = np.maximum(0.5 * block, size)
+    assert best is not None
+    return best[1]
 
 
 def _smooth_guide(

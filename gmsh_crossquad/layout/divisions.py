@@ -1,8 +1,9 @@
 """Divisions of the chords: of the guide grid, and of the final mesh.
 
 Every chord of the coarse complex gets `guide` cells of the guide grid, and every guide cell `fine` final edges along the chord.
-Both follow the local sizes; edges on CAD curves are kept shorter than 1.6 sizes and turn by less than a given angle, and a short
-CAD curve caps the divisions of the chords that end on it.  Prescribed (Transfinite) counts are equalities on sums of chords.
+Both follow the local sizes; edges on CAD curves are kept shorter than 1.6 sizes and turn by less than 35 degrees, unless a
+short CAD curve caps the divisions of the chord; then they still turn by less than 55 degrees.  Prescribed (Transfinite) counts
+are equalities on sums of chords.
 """
 
 from __future__ import annotations
@@ -17,8 +18,10 @@ from .chords import Chords
 
 __all__ = ["ChordDivisions", "Segments", "chord_divisions", "segments"]
 
-GUIDE_TURN = np.radians(35.0)
+TURN = np.radians(35.0)
+STEEPEST = np.radians(55.0)
 LONGEST = 1.6
+SHORT = 0.3
 
 
 @dataclass(frozen=True)
@@ -44,10 +47,19 @@ class Segments:
 
 @dataclass(frozen=True)
 class ChordDivisions:
-    """Guide cells per chord and final edges per guide cell, (n,) int64 each."""
+    """Divisions of the chords.
+
+    Attributes
+    ----------
+    guide, fine : (n,) int64
+        Guide cells per chord and final edges per guide cell.
+    longest : float
+        Longest final edge on an arc over its target size.
+    """
 
     guide: Int
     fine: Int
+    longest: float
 
 
 def segments(model: Model, tmesh: TMesh, divisions: Int, chords: Chords) -> Segments:
@@ -108,44 +120,48 @@ def chord_divisions(
         Prescribed counts of curves contradict each other.
     """
     seg = segments(model, tmesh, divisions, chords)
-    n = chords.n
-    on_curve = tmesh.arc_curve[seg.arc] >= 0
     local = size[seg.arc]
-    coarse = np.maximum(local, guide_size)
-
-    def mean(values: Float) -> Float:
-        weight = np.bincount(seg.chord, minlength=n)
-        return np.bincount(seg.chord, values, minlength=n) / np.maximum(weight, 1)
-
-    def largest(values: Float) -> Float:
-        out = np.zeros(n)
-        np.maximum.at(out, seg.chord, values)
-        return out
-
-    guide = np.maximum(1, np.round(mean(seg.length / coarse))).astype(np.int64)
-    guide = np.minimum(guide, _caps(model, tmesh, divisions, seg, n, coarse))
-    need = np.where(on_curve, np.maximum(seg.length / (LONGEST * coarse), seg.turning / GUIDE_TURN), 0.0)
-    guide = np.maximum(guide, np.ceil(largest(need) - 1e-9).astype(np.int64))
+    guide = _wanted(model, tmesh, seg, chords.n, np.maximum(local, guide_size))
     if finer is not None:
         guide = np.maximum(guide, finer)
-    want = mean(seg.length / local)
-    longest = largest(np.where(on_curve, seg.length / (LONGEST * local), 0.0))
-    fine = np.maximum(1, np.round(want / guide))
-    fine = np.maximum(fine, np.ceil(longest / guide - 1e-9)).astype(np.int64)
+    fine = np.maximum(1, np.round(_wanted(model, tmesh, seg, chords.n, local) / guide)).astype(np.int64)
     prescribed = {c: len(k.spacing) - 1 for c, k in enumerate(model.curves) if k.spacing is not None}
     if prescribed:
         guide, fine = _prescribe(model, tmesh, chords, guide, fine, prescribed)
-    return ChordDivisions(guide, fine)
+    longest = float((seg.length / (guide * fine)[seg.chord] / local).max(initial=0.0))
+    return ChordDivisions(guide, fine, longest)
 
 
-def _caps(model: Model, tmesh: TMesh, divisions: Int, seg: Segments, n: int, size: Float) -> Int:
+def _wanted(model: Model, tmesh: TMesh, seg: Segments, n: int, size: Float) -> Int:
+    """Divisions per chord for edges of the given size (s,) along the segments.
+
+    The geometric mean over the chord's segments, raised where edges on a curve would be long or turn much, capped by
+    the short curves that the chord ends on, and raised again to follow every curve at least roughly.
+    """
+    on_curve = tmesh.arc_curve[seg.arc] >= 0
+    ratio = np.log(np.maximum(seg.length / size, SHORT))
+    mean = np.exp(np.bincount(seg.chord, ratio, minlength=n) / np.maximum(np.bincount(seg.chord, minlength=n), 1))
+
+    def largest(values: Float) -> Float:
+        out = np.zeros(n)
+        np.maximum.at(out, seg.chord, np.where(on_curve, values, 0.0))
+        return np.ceil(out - 1e-9)
+
+    wanted = np.maximum(1, np.round(mean))
+    wanted = np.maximum(wanted, largest(seg.length / (LONGEST * size)))
+    wanted = np.maximum(wanted, largest(seg.turning / TURN))
+    wanted = np.minimum(wanted, _caps(model, tmesh, seg, n, size))
+    return np.maximum(wanted, largest(seg.turning / STEEPEST)).astype(np.int64)
+
+
+def _caps(model: Model, tmesh: TMesh, seg: Segments, n: int, size: Float) -> Int:
     """Upper bounds from short CAD curves: their edges shall not be much shorter than needed."""
     cap = np.full(n, np.iinfo(np.int64).max)
     curve = tmesh.arc_curve[seg.arc]
     for c in range(len(model.curves)):
         mine = np.flatnonzero(curve == c)
         if len(mine):
-            limit = max(1, round(model.curves[c].length / len(mine) / (0.3 * float(size[mine].mean()))))
+            limit = max(1, round(model.curves[c].length / len(mine) / (SHORT * float(size[mine].mean()))))
             np.minimum.at(cap, seg.chord[mine], limit)
     return cap
 

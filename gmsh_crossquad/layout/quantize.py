@@ -1,13 +1,14 @@
 """Integer quantization of a T-mesh: one mixed-integer linear program for the whole model.
 
-    min sum_a w_a |n_a - t_a|,  n_a >= 0 integer,
+    min sum_a f_a(n_a),  n_a >= 0 integer,
     equal sums on opposite sides of every patch, every open CAD curve >= 1, closed curve >= 3, boundary loop >= 3,
     separation cuts (module `cuts`), found lazily.
 
-t_a is the arc's length over the wanted block size, w_a = 1 / max(t_a, 1/2).  The cost is written with its kinks at integers,
-n = floor(t) + u + e - d with 0 <= u <= 1, e >= 0, 0 <= d <= floor(t): it agrees with |n - t| at every integer.  Every column then
-meets at most two patch rows with coefficients +-1, the matrix of a bidirected flow, whose linear relaxation has half-integral
-vertices (Heistermann, Warnett, Bommes 2023): branch and bound has next to nothing to do.
+t_a is the arc's length over the wanted block size.  The cost is the factor by which edges miss their size,
+f(n) = t/n - 1 for 1 <= n <= t, (n - t) / max(t, 1/2) for n > t, and f(0) = 2 t: convex.  It is taken piecewise linear with
+kinks at integers, n = floor(t) + u + e - d_1 - d_2 - ...; f is exact at floor(t), floor(t) + 1 and above, and at floor(t)
+halved again and again.  Every column then meets at most two patch rows with coefficients +-1, the matrix of a bidirected flow,
+whose linear relaxation has half-integral vertices (Heistermann, Warnett, Bommes 2023): little is left to branch and bound.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import scipy.sparse as sp
 from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
 from .cuts import Cut, separation_cuts
+from .integer_program import IntegerProgram
 from .quotient import quotient
 
 __all__ = ["Quantization", "quantize"]
@@ -83,6 +85,7 @@ def quantize(
     *,
     exact: dict[int, int] | None = None,
     at_most: dict[int, int] | None = None,
+    disjunctions: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Quantization:
     """Integer divisions of every arc.
@@ -105,98 +108,112 @@ def quantize(
     LayoutError
         No divisions exist that meet all conditions.
     """
-    from scipy.optimize import Bounds, LinearConstraint, milp
-
     n_arcs = len(tmesh.length)
     target = np.asarray(target, float)
     floor = np.floor(target)
-    fraction = target - floor
-    weight = 1.0 / np.maximum(target, 0.5)
-    # columns u, e, d; n = floor + u + e - d
-    cost = np.concatenate([weight * (1 - 2 * fraction), weight, weight])
     largest = 4.0 * max(float(target.max(initial=0.0)), 10.0) + 20.0 + len(model.curves)  # opposite a run of short curves
-    upper = np.concatenate([np.ones(n_arcs), np.full(n_arcs, largest), floor])
-    identity = sp.eye_array(n_arcs, format="csr")
-    expand = sp.hstack([identity, identity, -identity], format="csr")
+    arc, step, cost, upper = _columns(target, largest)
+    expand = sp.csr_array((step, (arc, np.arange(len(arc)))), shape=(n_arcs, len(arc)))
+    program = IntegerProgram(cost, upper)
+
+    def add(rows: sp.csr_array, lower: Float, most: Float) -> None:
+        on_columns = (rows @ expand).tocsr()
+        shift = rows @ floor
+        start, column = on_columns.indptr[:-1].astype(np.int64), on_columns.indices.astype(np.int64)
+        program.add_rows(lower - shift, most - shift, start, column, on_columns.data)
+
     balance = _balance(tmesh)
-    fixed_rows: list[tuple[sp.csr_array, Float, Float]] = [(balance @ expand, -(balance @ floor), -(balance @ floor))]
+    add(balance, np.zeros(balance.shape[0]), np.zeros(balance.shape[0]))
     for bounds, equal in ((exact or {}, True), (at_most or {}, False)):
         if bounds:
             row = np.concatenate([np.full(len(tmesh.pieces[c]), i) for i, c in enumerate(bounds)])
-            col = np.concatenate([np.array(tmesh.pieces[c]) for c in bounds])
-            m = sp.csr_array((np.ones(len(row)), (row, col)), shape=(len(bounds), n_arcs))
-            rhs = np.array(list(bounds.values()), float) - m @ floor
-            fixed_rows.append((m @ expand, rhs if equal else np.full(len(rhs), -np.inf), rhs))
+            column = np.concatenate([np.array(tmesh.pieces[c]) for c in bounds])
+            count = np.array(list(bounds.values()), float)
+            sums = sp.csr_array((np.ones(len(row)), (row, column)), shape=(len(bounds), n_arcs))
+            add(sums, count if equal else np.full(len(count), -np.inf), count)
 
-    cuts = _at_least(tmesh, model)
-    known = set(cuts)
-    n_base = len(cuts)
+    known: set[Cut] = set()
+    new = _at_least(tmesh, model)
+    n_base = len(set(new))
+    big = largest + float(floor.max(initial=0.0))
     for round_ in range(1, MAX_ROUNDS + 1):
-        binaries = sum(len(c.options) for c in cuts if len(c.options) > 1)
-        matrix, lower = _cut_rows(cuts, n_arcs, largest + float(floor.max(initial=0.0)), floor, expand, binaries)
-        constraints = [LinearConstraint(matrix, lower, np.inf)]
-        for fixed, least, most in fixed_rows:
-            padded = sp.hstack([fixed, sp.csr_array((fixed.shape[0], binaries))], format="csr")
-            constraints.append(LinearConstraint(padded, least, most))
-        result = milp(
-            np.concatenate([cost, np.zeros(binaries)]),
-            constraints=constraints,
-            integrality=np.ones(3 * n_arcs + binaries, np.int64),
-            bounds=Bounds(np.zeros(3 * n_arcs + binaries), np.concatenate([upper, np.ones(binaries)])),
-            options={"mip_rel_gap": 1e-2, "node_limit": 20_000, "time_limit": 60.0},
-        )
-        if result.x is None:
+        known.update(new)
+        _add_cuts(program, new if disjunctions else [Cut(c.options[:1]) for c in new], expand, floor, big)
+        solution = program.solve()
+        if solution is None:
             raise LayoutError(
-                "no integer divisions of the layout keep all corners and singularities apart"
-                if result.status == 2
-                else f"the quantization found no solution in its limits ({len(tmesh.patches)} patches)",
+                f"no divisions of the layout ({len(tmesh.patches)} patches) keep all corners and singularities apart",
                 remedy="another size, or fewer short curves, may help",
             )
-        step = np.round(result.x[: 3 * n_arcs])
-        divisions = (floor + step[:n_arcs] + step[n_arcs : 2 * n_arcs] - step[2 * n_arcs :]).astype(np.int64)
+        divisions = (floor + expand @ solution.values[: len(arc)]).astype(np.int64)
         new = [c for c in separation_cuts(tmesh, quotient(tmesh, divisions)) if c not in known]
         if progress is not None:
-            progress(f"quantization round {round_}: cost {result.fun:.4g}, {len(new)} new cuts")
+            progress(
+                f"quantization round {round_}: cost {solution.cost:.4g}, bound {solution.bound:.4g}, "
+                f"{solution.programs} programs, {len(new)} new cuts"
+            )
         if not new:
-            value = float(np.sum(weight * np.abs(divisions - target)))
-            return Quantization(divisions, round_, len(cuts) - n_base, value)
-        cuts += new
-        known.update(new)
+            total = float(_cost(target, divisions.astype(float)).sum())
+            return Quantization(divisions, round_, len(known) - n_base, total)
     raise LayoutError(f"the quantization did not settle in {MAX_ROUNDS} rounds", remedy="another size may help")
 
 
-def _cut_rows(
-    cuts: list[Cut], n_arcs: int, largest: float, floor: Float, expand: sp.csr_array, binaries: int
-) -> tuple[sp.csr_array, Float]:
-    """Cuts as rows on (u, e, d, binaries); a disjunction takes one binary per option and big-M."""
-    rows, columns, values, lower = [], [], [], []
-    b_rows, b_columns, b_values = [], [], []
-    r = b = 0
+def _cost(target: Float, n: Float) -> Float:
+    """f(n), see the module."""
+    above = (n - target) / np.maximum(target, 0.5)
+    below = np.where(n >= 1, target / np.maximum(n, 1.0) - 1.0, 2.0 * target)
+    return np.where(n > target, above, below)
+
+
+def _columns(target: Float, largest: float) -> tuple[Int, Float, Float, Float]:
+    """Columns of the piecewise linear cost: arc, sign, cost per unit, upper bound."""
+    n = len(target)
+    floor = np.floor(target)
+    every = np.arange(n)
+    columns = [
+        (every, np.ones(n), _cost(target, floor + 1) - _cost(target, floor), np.ones(n)),
+        (every, np.ones(n), 1.0 / np.maximum(target, 0.5), np.full(n, largest)),
+    ]
+    top = floor
+    while (top > 0).any():
+        low = np.floor(top / 2)
+        some = np.flatnonzero(top > 0)
+        a, b = top[some], low[some]
+        slope = (_cost(target[some], b) - _cost(target[some], a)) / (a - b)
+        columns.append((some, -np.ones(len(some)), slope, a - b))
+        top = low
+    arc, sign, cost, upper = (np.concatenate(c) for c in zip(*columns))
+    return arc, sign, cost, upper
+
+
+def _add_cuts(program: IntegerProgram, cuts: list[Cut], expand: sp.csr_array, floor: Float, big: float) -> None:
+    """Add cuts as rows; a disjunction takes one binary column per option and big-M."""
+    start: list[int] = []
+    column: list[int] = []
+    value: list[float] = []
+    lower: list[float] = []
     for cut in cuts:
         many = len(cut.options) > 1
-        first = b
-        for expression, bound in cut.options:
+        first = program.add_columns(np.zeros(len(cut.options)), np.ones(len(cut.options))) if many else 0
+        for k, (expression, bound) in enumerate(cut.options):
+            start.append(len(column))
+            shift = 0.0
             for arc, coefficient in expression:
-                rows.append(r)
-                columns.append(arc)
-                values.append(float(coefficient))
+                a, b = expand.indptr[arc], expand.indptr[arc + 1]
+                column += expand.indices[a:b].tolist()
+                value += (coefficient * expand.data[a:b]).tolist()
+                shift += coefficient * floor[arc]
             relaxed = float(bound)
             if many:
-                big = bound + largest * sum(max(-c, 0) for _, c in expression)
-                b_rows.append(r)
-                b_columns.append(b)
-                b_values.append(-big)
-                relaxed -= big
-                b += 1
-            lower.append(relaxed)
-            r += 1
+                slack = bound + big * sum(max(-c, 0) for _, c in expression)
+                column.append(first + k)
+                value.append(-slack)
+                relaxed -= slack
+            lower.append(relaxed - shift)
         if many:
-            for k in range(first, b):
-                b_rows.append(r)
-                b_columns.append(k)
-                b_values.append(1.0)
+            start.append(len(column))
+            column += range(first, first + len(cut.options))
+            value += [1.0] * len(cut.options)
             lower.append(1.0)
-            r += 1
-    on_arcs = sp.csr_array((values, (rows, columns)), shape=(r, n_arcs))
-    on_binaries = sp.csr_array((b_values, (b_rows, b_columns)), shape=(r, binaries))
-    return sp.hstack([on_arcs @ expand, on_binaries], format="csr"), np.array(lower) - on_arcs @ floor
+    n = len(lower)
+    program.add_rows(np.array(lower), np.full(n, np.inf), np.array(start), np.array(column), np.array(value))
