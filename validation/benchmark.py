@@ -1,0 +1,157 @@
+"""Prints what meshing costs: start-up, a million quads against Gmsh's own binary write, and models of many blocks.
+
+    python validation/benchmark.py > table.md
+
+Times are CPU seconds (one thread), the least of several runs; every row has a process of its own.  Machines differ: compare
+within a run, above all the ratio to the time that Gmsh takes to write the same mesh to a binary .msh file.
+"""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+HERE = Path(__file__).resolve()
+GEO = HERE.parent.parent / "geo"
+RUNS = 3
+SIZES = (0.0195, 0.00617, 0.001932)  # 10^4, 10^5, 10^6 quads on the plate with a hole
+HOLES = (1, 2, 4, 6, 8)  # per side
+
+
+def child(*arguments: str) -> tuple[dict, float]:
+    """Run this script in a new process: what it printed, and its CPU seconds."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    out = subprocess.run([sys.executable, str(HERE), *arguments], check=True, capture_output=True, text=True).stdout
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return json.loads(out.splitlines()[-1]) if out.strip() else {}, seconds
+
+
+def command(*arguments: str) -> float:
+    """CPU seconds of a program."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(arguments, check=True, capture_output=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def table(title: str, head: tuple[str, ...], rows: list[tuple]) -> None:
+    print(f"\n## {title}\n")
+    print(f"| {' | '.join(head)} |\n|{'---|' * len(head)}")
+    for row in rows:
+        print("| " + " | ".join(f"{x:.3f}" if isinstance(x, float) else str(x) for x in row) + " |")
+
+
+def start_up() -> None:
+    def code(text: str) -> float:
+        return min(command(sys.executable, "-c", text) for _ in range(2 * RUNS))
+
+    program = (sys.executable, "-m", "gmsh_crossquad")
+    with tempfile.TemporaryDirectory() as folder:
+        mesh = (*program, "mesh", str(GEO / "plate_hole.geo"), "-o", f"{folder}/out.msh", "--size", "0.06")
+        runs = [(command(*mesh), subprocess.run(mesh, check=True, capture_output=True, text=True).stdout) for _ in range(RUNS)]
+    work = [{line.split()[0]: float(line.split()[1]) for line in text.splitlines()[:-2]} for _, text in runs]
+    whole = min(seconds for seconds, _ in runs)
+    stages = min(sum(v for k, v in w.items() if k not in ("start", "load")) for w in work)
+    rows = [
+        ("Python alone", code("pass")),
+        ("... with NumPy and Gmsh", code("import numpy, gmsh")),
+        ("... with scipy.sparse.linalg and csgraph", code("import numpy, gmsh, scipy.sparse.linalg, scipy.sparse.csgraph")),
+        ("... with `gmsh_crossquad.mesh`", code("from gmsh_crossquad import mesh")),
+        ("`gmsh-crossquad --version`", min(command(*program, "--version") for _ in range(RUNS))),
+        ("`gmsh-crossquad mesh`, 1,000 quads, whole", whole),
+        ("... of that start-up: all but the stages", whole - stages),
+    ]
+    table("Start-up", ("what", "CPU s"), rows)
+
+
+def plate(size: str) -> None:
+    """Mesh the plate with a hole; prints the times as JSON."""
+    import gmsh
+
+    import gmsh_crossquad as cq
+
+    gmsh.initialize(readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("Mesh.Binary", 1)
+    gmsh.open(str(GEO / "plate_hole.geo"))
+    cq.mesh(size=0.1)  # everything is loaded
+    best: dict[str, float] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in range(RUNS):
+            gmsh.model.mesh.clear()
+            start = time.process_time()
+            result = cq.mesh(size=float(size))
+            whole = time.process_time()
+            gmsh.write(f"{folder}/out.msh")
+            write = time.process_time() - whole
+            bytes_ = os.path.getsize(f"{folder}/out.msh")
+            quality = time.process_time()
+            q = result.quality
+            seconds = {"fill": result.timings["fill"], "put": result.timings["put"], "whole": whole - start, "write": write}
+            seconds["quality"] = time.process_time() - quality
+            best = {k: min(v, best.get(k, v)) for k, v in seconds.items()}
+    assert q.conforming and q.inverted == 0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform != "darwin" else 2**30)
+    print(json.dumps(best | {"quads": q.quads, "min": q.min_scaled_jacobian, "peak": peak, "megabytes": bytes_ / 1e6}))
+
+
+def million() -> None:
+    rows = []
+    for size in SIZES:
+        r, _ = child("plate", str(size))
+        rows.append(
+            (f"{r['quads']:,}", r["fill"], r["put"], r["whole"], r["write"], f"{r['whole'] / r['write']:.1f}", r["quality"])
+            + (f"{r['peak']:.2f}", f"{r['min']:.2f}")
+        )
+    head = ("quads", "fill", "put", "whole", "write", "whole / write", "quality", "peak GB", "min SJ")
+    table("A plate with a hole", head, rows)
+
+
+def perforated(n: str) -> None:
+    """Mesh a plate with n x n holes in two materials; prints the times as JSON."""
+    import gmsh
+
+    import gmsh_crossquad as cq
+
+    gmsh.initialize(readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ, k = gmsh.model.occ, int(n)
+    best = float("inf")
+    for run in range(RUNS):
+        gmsh.model.add(f"perforated {run}")
+        halves = [(2, occ.addRectangle(0, 0, 0, k / 2, k)), (2, occ.addRectangle(k / 2, 0, 0, k / 2, k))]
+        holes = [(2, occ.addDisk(i + 0.47, j + 0.53, 0, 0.15, 0.15)) for i in range(k) for j in range(k)]
+        occ.cut(occ.fragment(halves, [])[0], holes)
+        occ.synchronize()
+        start = time.process_time()
+        result = cq.mesh(size=0.05)
+        best = min(best, time.process_time() - start)
+        gmsh.model.remove()
+    q = result.quality
+    slow = sorted(result.timings.items(), key=lambda item: -item[1])[:3]
+    stages = ", ".join(f"{name} {seconds:.2f}" for name, seconds in slow)
+    print(json.dumps({"blocks": q.blocks, "quads": q.quads, "seconds": best, "min": q.min_scaled_jacobian, "stages": stages}))
+
+
+def blocks() -> None:
+    rows = []
+    for n in HOLES:
+        r, _ = child("perforated", str(n))
+        rows.append((f"{n * n}", r["blocks"], f"{r['quads']:,}", r["seconds"], f"{r['min']:.2f}", r["stages"]))
+    table("Many blocks: plates of two materials with holes", ("holes", "blocks", "quads", "CPU s", "min SJ", "slowest"), rows)
+
+
+if __name__ == "__main__":
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    if len(sys.argv) == 3:
+        {"plate": plate, "perforated": perforated}[sys.argv[1]](sys.argv[2])
+    else:
+        print("# Benchmark\n\n    python validation/benchmark.py\n\nCPU seconds, the least of several runs (see the script).")
+        start_up()
+        million()
+        blocks()
