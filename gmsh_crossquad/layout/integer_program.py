@@ -53,7 +53,7 @@ class IntegerProgram:
     """
 
     def __init__(self, cost: Float, upper: Float) -> None:
-        self._solver = highspy.Highs()  # type: ignore[no-untyped-call]
+        self._solver = highspy.Highs()
         self._solver.setOptionValue("log_to_console", False)
         self._solver.setOptionValue("output_flag", False)
         self._solver.setOptionValue("threads", 1)
