@@ -1,7 +1,7 @@
 """Judging a surface mesh against the model that it is a mesh of.
 
-Every CAD vertex is a node, every edge with a single cell follows a curve at which the model's faces end, the area is the
-model's, and every physical group is carried in full.
+Every CAD vertex is a node, every edge with a single cell follows a curve at which the model's faces end and these curves are
+followed by such edges, the area is the model's, and every physical group is carried in full.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .check import TOUCH, Report, free_edges
-from .records import Float, Int, Model
+from .records import Curve, Float, Int, Model
 
 if TYPE_CHECKING:
     from .cad.files import MeshArrays
@@ -21,6 +21,9 @@ __all__ = ["compare"]
 
 _MEASURE = 0.02
 """Relative difference of a length or area that a mesh may have from its model, besides the segments cut off by chords."""
+
+_SAMPLES = 200  # of a curve
+_ON_CURVE = 1e-5  # of the model: the samples of a curve may be that far from it
 
 
 def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[int, str], tuple[int, ...]]) -> Report:
@@ -53,6 +56,9 @@ def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[i
     loose = _loose_edges(points, free_edges(mesh), model)
     if loose:
         faults.append(f"{loose} edges with one cell are not on the boundary of the model")
+    left = _left_curves(points, free_edges(mesh), model)
+    if left:
+        faults.append("the boundary does not follow curve " + ", ".join(map(str, left)))
     areas = np.array([_face_area(model, row) for row in range(len(model.faces))])
     area = _cell_areas(points, mesh)
     if abs(area.sum() - areas.sum()) > _MEASURE * areas.sum() + _cut_off(points, mesh):
@@ -89,38 +95,71 @@ def _face_area(model: Model, row: int) -> float:
     return total
 
 
-def _loose_edges(points: Float, edges: Int, model: Model) -> int:
-    """Edges with a single cell whose ends are not both on one of the curves that bound one face only."""
+def _ends_of_faces(model: Model) -> list[Curve]:
+    """The curves that bound one face once."""
     uses = np.zeros(len(model.curves), np.int64)
     for face in model.faces:
         for loop in face.loops:
             for curve, _ in loop:
                 uses[curve] += 1
-    a = np.concatenate([c.points[:-1] for c, u in zip(model.curves, uses, strict=True) if u == 1] or [np.zeros((0, 3))])
-    b = np.concatenate([c.points[1:] for c, u in zip(model.curves, uses, strict=True) if u == 1] or [np.zeros((0, 3))])
+    return [c for c, u in zip(model.curves, uses, strict=True) if u == 1]
+
+
+def _loose_edges(points: Float, edges: Int, model: Model) -> int:
+    """Edges with a single cell whose ends are not both on one of the curves that bound one face only."""
+    curves = _ends_of_faces(model)
     if not len(edges):
         return 0
-    if not len(a):
+    if not curves:
         return len(edges)
+    a, b = np.concatenate([c.points[:-1] for c in curves]), np.concatenate([c.points[1:] for c in curves])
     ends = np.unique(edges)
+    shortest = np.full(len(points), np.inf)
+    np.minimum.at(shortest, edges, np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)[:, None])
     on = np.zeros(len(points), bool)
-    on[ends] = _distance(points[ends], a, b) < 1e-5
+    on[ends] = _distance(points[ends], a, b)[0] < np.maximum(_ON_CURVE, 0.05 * shortest[ends])
     return int(np.count_nonzero(~on[edges].all(axis=1)))
 
 
-def _distance(points: Float, a: Float, b: Float) -> Float:
-    """Distance of points (n, 3) from the segments a-b, each cut into pieces short enough for a nearest-neighbour search."""
+def _left_curves(points: Float, edges: Int, model: Model) -> list[int]:
+    """Tags of curves that bound one face only and stray from the edges with a single cell by more than half of their length."""
+    curves = _ends_of_faces(model)
+    if not curves or not len(edges):
+        return []
+    a, b = points[edges[:, 0]], points[edges[:, 1]]
+    places = [c.at(np.linspace(0.0, c.length, _SAMPLES)) for c in curves]
+    distance, length = _distance(np.concatenate(places), a, b)
+    far = np.flatnonzero((distance > 0.5 * length).reshape(len(curves), _SAMPLES).any(axis=1))
+    return sorted(curves[i].tag for i in far.tolist())
+
+
+def _distance(points: Float, a: Float, b: Float) -> tuple[Float, Float]:
+    """Distance of points (n, 3) from the nearest segment a-b, and that segment's length.
+
+    The segments are cut into pieces of at most 0.01.  Of every class of pieces of about one length the nearest are looked at, so
+    that many short ones do not hide a long one.
+    """
     from .spatial import cKDTree
 
     length = np.linalg.norm(b - a, axis=1)
     pieces = np.maximum(1, np.ceil(length / 0.01).astype(np.int64))
     row = np.repeat(np.arange(len(a)), pieces)
     place = (np.arange(len(row)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 0.5) / pieces[row]
-    tree = cKDTree(a[row] + place[:, None] * (b - a)[row])
-    near = row[tree.query(points, k=min(8, len(row)))[1].reshape(len(points), -1)]
-    offset, side = points[:, None] - a[near], (b - a)[near]
-    t = np.clip(np.einsum("nkc,nkc->nk", offset, side) / np.maximum(length[near] ** 2, np.finfo(float).tiny), 0.0, 1.0)
-    return np.linalg.norm(offset - t[..., None] * side, axis=2).min(axis=1)
+    middle = a[row] + place[:, None] * (b - a)[row]
+    kind = np.floor(np.log2(np.maximum(length / pieces, 1e-12)) / 2)[row]
+    distance, nearest = np.full(len(points), np.inf), np.zeros(len(points), np.int64)
+    for k in np.unique(kind):
+        mine = np.flatnonzero(kind == k)
+        near = row[mine[cKDTree(middle[mine]).query(points, k=min(8, len(mine)))[1].reshape(len(points), -1)]]
+        offset, side = points[:, None] - a[near], (b - a)[near]
+        t = np.clip(np.einsum("nkc,nkc->nk", offset, side) / np.maximum(length[near] ** 2, np.finfo(float).tiny), 0.0, 1.0)
+        away = np.linalg.norm(offset - t[..., None] * side, axis=2)
+        best = away.argmin(axis=1)[:, None]
+        found = np.take_along_axis(away, best, axis=1)[:, 0]
+        closer = found < distance
+        distance[closer] = found[closer]
+        nearest[closer] = np.take_along_axis(near, best, axis=1)[closer, 0]
+    return distance, length[nearest]
 
 
 def _lost_groups(mesh: MeshArrays, model: Model, groups: dict[tuple[int, str], tuple[int, ...]], areas: Float) -> list[str]:

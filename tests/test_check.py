@@ -5,8 +5,8 @@ import pytest
 
 from gmsh_crossquad.cad.files import MeshArrays
 from gmsh_crossquad.check import check_mesh, format_report
-from gmsh_crossquad.compare import compare
-from tests.models import two_materials, two_squares
+from gmsh_crossquad.compare import _distance, compare
+from tests.models import disc, two_materials, two_squares
 from tests.results import two_squares_mesh
 
 GROUPS = {(1, "left"): (6,), (2, "right square"): (2,)}
@@ -175,6 +175,30 @@ def test_chords_of_a_circle_may_cut_off_their_segments_but_no_more(radius, fault
     report = compare(check_mesh(mesh), mesh, model, {(2, "disc"): (2,)})
     assert report.inverted == 0
     assert len([f for f in report.faults if "'disc'" in f]) == faults
+
+
+def test_many_short_segments_do_not_hide_a_long_one():
+    # the middle of the long segment is farther from the point than all of the short ones, which are above it
+    x = np.linspace(-1e-3, 1e-3, 41)
+    a = np.r_[[[-0.004, 0, 0]], np.c_[x[:-1], np.full(40, 1e-3), np.zeros(40)]]
+    b = np.r_[[[0.006, 0, 0]], np.c_[x[1:], np.full(40, 1e-3), np.zeros(40)]]
+    distance, length = _distance(np.array([[0.0, 1e-4, 0.0]]), a, b)
+    assert distance == pytest.approx(1e-4)
+    assert length == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("last, faults", [(90, 1), (270, 0)])
+def test_an_edge_that_cuts_across_a_curve_is_a_fault(last, faults):
+    # a quad inside a circle: its last edge runs from that angle to 360 degrees, its other edges share the rest
+    model = disc()
+    angle = np.radians(np.linspace(0, last, 4))
+    points = 0.5 * (model.curves[0].points.min(0) + model.curves[0].points.max(0))
+    radius = 0.5 * np.ptp(model.curves[0].points[:, 0])
+    points = (points + radius * np.c_[np.cos(angle), np.sin(angle), np.zeros(4)]) * model.scale + model.origin
+    one = np.ones(1, np.int64)
+    mesh = arrays(points=points, quads=np.arange(4)[None], quad_entity=one, lines=np.zeros((0, 2), np.int64), groups={})
+    report = compare(check_mesh(mesh), mesh, model, {})
+    assert len([f for f in report.faults if "does not follow curve" in f]) == faults
 
 
 @pytest.mark.parametrize("lost, what", [((1, "left"), "curve 'left'"), ((2, "right square"), "surface 'right square'")])
