@@ -1,0 +1,173 @@
+"""From the T-mesh of the model to a smoothed guide grid: quantize, divide the chords, place, smooth, check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from .embed.place import place
+from .embed.smooth import smooth
+from .errors import LayoutError, MeshError
+from .fill.numbering import guide_chords
+from .fill.pipeline import poor_cells
+from .layout.chords import Chords, arc_divisions, find_chords
+from .layout.divisions import ChordDivisions, chord_divisions, cumulative_turning
+from .layout.quantize import quantize
+from .layout.quotient import Quotient, arc_points, quotient
+from .layout.verify import problems
+from .records import Float, Guide, Int, Model, TMesh
+from .watch import Watch
+
+__all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
+
+ROUNDS = 3
+GROWTH = 3
+STEEP = np.radians(60.0)
+
+Evaluate = Callable[[int, Float], Float]
+
+
+@dataclass(frozen=True)
+class GuideResult:
+    """A guide grid without inverted cells.
+
+    Attributes
+    ----------
+    guide : Guide
+    fine : (c,) int64
+        Final edges per guide edge of every guide chord (`fill.numbering.guide_chords`).
+    quality : float
+        Minimum scaled Jacobian of the guide.
+    work : int
+        Guide quads that were smoothed, all rounds together.
+    notes : tuple of str
+    """
+
+    guide: Guide
+    fine: Int
+    quality: float
+    work: int
+    notes: tuple[str, ...]
+
+
+def coarse_divisions(model: Model, tmesh: TMesh, block: Float) -> Int:
+    """Coarse divisions of the arcs for the wanted block edge `block` (a,) along every arc, checked.
+
+    Raises
+    ------
+    LayoutError
+    """
+    coarse = quantize(model, tmesh, tmesh.length / block).divisions
+    wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
+    if wrong:
+        raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
+    return coarse
+
+
+def smooth_guide(
+    model: Model,
+    tmesh: TMesh,
+    coarse: Int,
+    size: Float,
+    guide_size: float,
+    evaluate: Evaluate,
+    vertices: Float,
+    watch: Watch,
+    capped: bool = True,
+) -> GuideResult:
+    """The smoothed guide grid; chords of cells that cannot be filled well get more guide cells.
+
+    Parameters
+    ----------
+    coarse : (a,) int64
+    size : (a,) float64, scaled
+    guide_size : float, scaled
+    evaluate, vertices
+        As for `fill.pipeline.fill`.
+    watch : Watch
+    capped : bool
+        As for `layout.divisions.chord_divisions`.
+
+    Raises
+    ------
+    LayoutError, MeshError
+    """
+    with watch.stage("guide"):
+        chords = find_chords(tmesh, quotient(tmesh, coarse))
+    notes: list[str] = []
+    finer: Int | None = None
+    best: tuple[int, float, Guide, Int] | None = None
+    first = work = 0
+    for round_ in range(ROUNDS):
+        with watch.stage("guide"):
+            divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer, capped=capped)
+            q = quotient(tmesh, arc_divisions(chords, divisions.guide))
+            first = first or len(q.quads)
+            if len(q.quads) > GROWTH * first:
+                break
+            wrong = problems(model, tmesh, q)
+            if wrong:
+                raise LayoutError(f"the guide grid is not valid ({wrong[0]})", remedy="another size may help")
+            start = place(model, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
+            coarse_chord = _coarse_chords(tmesh, q, chords, divisions)
+            fine = divisions.fine[coarse_chord]
+        work += len(q.quads)
+        with watch.stage("smooth"):
+            guide, report = smooth(start, model)
+        bad = report.inverted
+        if not len(bad):
+            with watch.stage("fill"):
+                poor = poor_cells(model, guide, fine, evaluate, vertices)
+                bad = np.union1d(poor, _steep_cells(model, guide, fine))
+        if best is None or (-len(report.inverted), report.min_scaled_jacobian) > best[:2]:
+            best = (-len(report.inverted), report.min_scaled_jacobian, guide, fine)
+        elif len(report.inverted) > -best[0]:
+            break
+        if not len(bad) or len(bad) > 0.1 * len(guide.quads):
+            break
+        if round_ + 1 < ROUNDS:
+            notes.append(f"{len(bad)} guide cells could not be filled well; their chords were refined")
+        _, quad_edges, chord, _ = guide_chords(guide.quads)
+        finer = divisions.guide.copy()
+        finer[np.unique(coarse_chord[chord[quad_edges[bad]]])] *= 2
+    assert best is not None
+    inverted, quality, guide, fine = best
+    if inverted:
+        raise MeshError("the layout cannot be laid into the faces without inverted cells", remedy="a smaller size may help")
+    return GuideResult(guide, fine, quality, work, tuple(notes))
+
+
+def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
+    """Guide quads with an edge on a CAD curve whose final edges turn by more than `STEEP`."""
+    edges, quad_edges, chord, _ = guide_chords(guide.quads)
+    n = len(guide.points)
+    keys = edges[:, 0] * n + edges[:, 1]
+    steep = np.zeros(len(edges), bool)
+    for curve, chain in zip(model.curves, guide.chains):
+        places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
+        s, total = cumulative_turning(curve.points, curve.arclength)
+        turn = np.abs(np.diff(np.interp(places, s, total)))
+        row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
+        steep[row] = turn / fine[chord[row]] > STEEP
+    return np.flatnonzero(steep[quad_edges].any(axis=1))
+
+
+def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:
+    """Final edges of every guide edge along a curve."""
+    segment = np.concatenate([chords.arc_segments[arc] for arc in pieces])
+    return np.repeat(divisions.fine[segment], divisions.guide[segment])
+
+
+def _coarse_chords(tmesh: TMesh, q: Quotient, chords: Chords, divisions: ChordDivisions) -> Int:
+    """Coarse chord of every guide chord; every guide chord ends on an arc or crosses one."""
+    edges, _, chord, n = guide_chords(q.quads)
+    keys = edges[:, 0] * q.n_vertices + edges[:, 1]
+    out = np.full(n, -1, np.int64)
+    for arc in np.flatnonzero(q.divisions > 0).tolist():
+        v = q.vertex[arc_points(tmesh, q.divisions, q.offset, arc)]
+        key = np.minimum(v[:-1], v[1:]) * q.n_vertices + np.maximum(v[:-1], v[1:])
+        segment = chords.arc_segments[arc]
+        out[chord[np.searchsorted(keys, key)]] = np.repeat(segment, divisions.guide[segment])
+    return out
