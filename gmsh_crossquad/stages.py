@@ -40,7 +40,7 @@ MANY_ARCS = 3_500
 ATTEMPTS = ((1.0, 1.0, True), (1.0, 0.4, True), (1.0, 1.0, False), (1.0, 0.15, True), (0.7, 1.0, True))
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.8
-MOST_WORK = 30_000
+MOST_WORK = 16_000
 
 
 @dataclass(frozen=True)
