@@ -40,15 +40,12 @@ class GuideResult:
         Final edges per guide edge of every guide chord (`fill.numbering.guide_chords`).
     quality : float
         Minimum scaled Jacobian of the guide.
-    work : int
-        Guide quads that were smoothed, all rounds together.
     notes : tuple of str
     """
 
     guide: Guide
     fine: Int
     quality: float
-    work: int
     notes: tuple[str, ...]
 
 
@@ -99,7 +96,7 @@ def smooth_guide(
     notes: list[str] = []
     finer: Int | None = None
     best: tuple[int, float, Guide, Int] | None = None
-    first = work = 0
+    first = 0
     for round_ in range(ROUNDS):
         with watch.stage("guide"):
             divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer, capped=capped)
@@ -113,7 +110,7 @@ def smooth_guide(
             start = place(model, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
             coarse_chord = _coarse_chords(tmesh, q, chords, divisions)
             fine = divisions.fine[coarse_chord]
-        work += len(q.quads)
+        watch.work += len(q.quads)
         with watch.stage("smooth"):
             guide, report = smooth(start, model)
         bad = report.inverted
@@ -136,7 +133,7 @@ def smooth_guide(
     inverted, quality, guide, fine = best
     if inverted:
         raise MeshError("the layout cannot be laid into the faces without inverted cells", remedy="a smaller size may help")
-    return GuideResult(guide, fine, quality, work, tuple(notes))
+    return GuideResult(guide, fine, quality, tuple(notes))
 
 
 def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:

@@ -108,8 +108,9 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
     faces: dict[float, _Faces] = {}
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
-    work = 0
     for background, blocks, capped in ATTEMPTS:
+        if watch.work > MOST_WORK:
+            break
         try:
             if background not in faces:
                 faces[background] = _faces(model, replace(options, background=options.background * background), watch, notes)
@@ -130,8 +131,7 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
                     model, found.meshes, found.fields, tmesh, coarse, result.guide, result.fine, mesh, mesh.notes, watch.seconds
                 ),
             )
-        work += result.work
-        if (score[0] and score[1]) or work > MOST_WORK:
+        if score[0] and score[1]:
             break
     if best is not None:
         return best[1]

@@ -1,4 +1,4 @@
-"""Seconds per stage."""
+"""Seconds and work per run."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ __all__ = ["Watch"]
 
 @dataclass
 class Watch:
-    """Seconds per stage, and a listener that is told when a stage starts."""
+    """Seconds per stage, a listener that is told when a stage starts, and the work so far: guide quads that were smoothed.
+
+    Work, unlike time, is the same in every run; what is tried next may depend on it.
+    """
 
     listener: Callable[[str], None] | None = None
     seconds: dict[str, float] = field(default_factory=dict)
+    work: int = 0
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
