@@ -6,10 +6,8 @@ from gmsh_crossquad.field.boundary import correct_boundary
 from gmsh_crossquad.field.clearance import Clearance
 from gmsh_crossquad.field.forces import forces, gradient
 from gmsh_crossquad.field.operators import FieldOperators
-from gmsh_crossquad.field.relax import attraction, cancel_pairs, leave_corners, relax_singularities
+from gmsh_crossquad.field.relax import attraction, leave_corners, relax_singularities
 from gmsh_crossquad.field.singularities import (
-    move_index,
-    shortest_path,
     singular_vertices,
     snap_to_vertices,
     to_integer,
@@ -18,7 +16,6 @@ from gmsh_crossquad.field.singularities import (
 )
 from gmsh_crossquad.field.smooth import smooth_field
 from gmsh_crossquad.field.surface_mesh import SurfaceMesh
-from gmsh_crossquad.records import CrossField
 
 from .field_meshes import annulus, at, disc, grid, middles, prescribed, singular_angle, square_corners
 from .models import background, wedge
@@ -114,21 +111,6 @@ def test_boundary_correction_prefers_annihilation():
     wanted = to_integer(vertex_index(mesh, field.rotation), "index")
     assert not np.array_equal(np.rint(vertex_index(mesh, rotation)), wanted)
     assert np.allclose(correct_boundary(mesh, rotation, wanted), field.rotation, atol=1e-12)
-
-
-def test_close_opposite_pair_is_cancelled():
-    mesh = grid(10, 10)
-    aligner = Aligner(mesh, FieldOperators(mesh), square_corners(mesh))
-    rotation = np.zeros((len(mesh.triangles), 3))
-    theta = prescribed(mesh, np.zeros(len(mesh.edges))).theta
-    target = np.zeros(len(mesh.points), bool)
-    target[at(mesh, 7, 5)] = True
-    move_index(mesh, rotation, shortest_path(mesh, [at(mesh, 5, 5)], target, ~mesh.boundary_vertex, 20), 1)
-    field, _ = aligner.rotate(CrossField(theta, smooth_field(mesh, aligner.operators).rotation + rotation))
-    assert sorted(singular_vertices(mesh, field.rotation)[1]) == [-1, 1]
-    cleared = cancel_pairs(aligner, field)
-    assert len(singular_vertices(mesh, cleared.rotation)[0]) == 0
-    assert aligner.operators.energy(cleared.rotation) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_singularities_leave_a_hole():

@@ -11,10 +11,12 @@ from gmsh_crossquad.field.singularities import (
     shortest_path,
     singular_vertices,
     snap_to_vertices,
+    to_integer,
     triangle_index,
     vertex_index,
     walk,
 )
+from gmsh_crossquad.field.surface_mesh import SurfaceMesh
 
 from .field_meshes import annulus, at, disc, grid, middles, prescribed, singular_angle
 
@@ -124,3 +126,20 @@ def test_wrong_sum_is_refused():
         check_poincare_hopf(mesh, index)
     index[:4] = 1
     check_poincare_hopf(mesh, index)
+
+
+def test_an_error_says_where():
+    mesh = grid(3, 3)
+    values = np.zeros(len(mesh.points))
+    values[5] = 0.25
+    with pytest.raises(LayoutError, match="off by 0.25") as caught:
+        to_integer(values, "an index", mesh.points)
+    assert caught.value.location == tuple(mesh.points[5])
+
+
+def test_a_singularity_without_room_is_located():
+    alone = SurfaceMesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]))
+    rotation = np.array([[QUARTER, 0.0, 0.0]])
+    with pytest.raises(LayoutError, match="without interior vertex") as caught:
+        snap_to_vertices(alone, rotation)
+    assert np.allclose(caught.value.location, alone.points.mean(axis=0))

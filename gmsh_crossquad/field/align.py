@@ -38,7 +38,7 @@ from .singularities import (
 from .smooth import wrap
 from .surface_mesh import SurfaceMesh
 
-__all__ = ["Aligner", "align"]
+__all__ = ["Aligner", "align", "closest"]
 
 _TOLERANCE = 1e-6
 
@@ -91,6 +91,7 @@ class Aligner:
         defect = to_integer(
             np.array([np.sum(self.turning[p.vertices] - through[p.vertices]) for p in self.loops]) / QUARTER,
             "the degree of the cross field along a boundary loop",
+            np.array([self.mesh.points[p.vertices[0]] for p in self.loops]),
         )
         components = np.array([loop.component for loop in self.loops])
         total = np.bincount(components, defect)
@@ -109,7 +110,9 @@ class Aligner:
             path = shortest_path(self.mesh, self.loops[i].vertices.tolist(), target, inside, len(self.mesh.points))
             if not path:
                 raise LayoutError(
-                    "no path of edges leads from a hole to the outer boundary", remedy="use a finer background mesh"
+                    "no path of edges leads from a hole to the outer boundary",
+                    location=self.mesh.points[self.loops[i].vertices[0]],
+                    remedy="use a finer background mesh",
                 )
             move_index(self.mesh, out, path, int(defect[i]))
         return out
@@ -147,7 +150,7 @@ class Aligner:
         periods = np.zeros(len(self.loops), np.int64)
         if self.holes:
             basis, energy = self.harmonic()
-            m = _closest(energy, -self.flux(rotation)[self.holes] / QUARTER)
+            m = closest(energy, -self.flux(rotation)[self.holes] / QUARTER)
             if np.any(m):
                 x = x + QUARTER * (basis @ m)
                 rotation = closed + self.operators.difference(x)
@@ -157,7 +160,7 @@ class Aligner:
     def finish(self, field: CrossField, periods: Int) -> AlignedField:
         """Check an aligned field and collect its indices."""
         mesh = self.mesh
-        index = to_integer(vertex_index(mesh, field.rotation), "the index of a vertex")
+        index = to_integer(vertex_index(mesh, field.rotation), "the index of a vertex", mesh.points)
         wrong = np.flatnonzero(mesh.boundary_vertex & (index != self.boundary_index))
         residual = float(np.abs(wrap(field.theta[self.operators.fixed])).max())
         angle = field.theta[mesh.triangle_edges] + mesh.edge_direction
@@ -165,13 +168,14 @@ class Aligner:
         if len(wrong) or residual > _TOLERANCE or drift > _TOLERANCE or np.any(triangle_index(field.rotation)):
             raise LayoutError(
                 f"the cross field could not be aligned ({len(wrong)} wrong indices, residual {max(residual, drift):.3g})",
+                location=mesh.points[wrong[0]] if len(wrong) else None,
                 remedy="use a finer background mesh",
             )
         check_poincare_hopf(mesh, index)
         return AlignedField(field, index, periods, self.flux(field.rotation), residual)
 
 
-def _closest(energy: Float, right: Float) -> Int:
+def closest(energy: Float, right: Float) -> Int:
     """Integers m (k,) with small ``1/2 m'Am - right.m``: the rounded real minimum, improved by single steps."""
     m = np.rint(np.linalg.solve(energy, right)).astype(np.int64)
     slope = energy @ m - right
@@ -211,8 +215,9 @@ def align(mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, bound
     """
     aligner = Aligner(mesh, operators, boundary_index)
     inside = ~mesh.boundary_vertex
-    before = to_integer(vertex_index(mesh, field.rotation)[inside], "the index of an interior vertex")
+    before = to_integer(vertex_index(mesh, field.rotation)[inside], "the index of an interior vertex", mesh.points[inside])
     result = aligner.finish(*aligner.rotate(field))
-    if np.any(result.index[inside] != before):
-        raise LayoutError("alignment changed a singularity", remedy="report the model")
+    changed = mesh.points[inside][result.index[inside] != before]
+    if len(changed):
+        raise LayoutError("alignment changed a singularity", location=changed[0], remedy="report the model")
     return result

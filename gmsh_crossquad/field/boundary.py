@@ -29,7 +29,7 @@ def correct_boundary(mesh: SurfaceMesh, rotation: Float, boundary_index: Int) ->
     """
     out = rotation.copy()
     on = np.flatnonzero(mesh.boundary_vertex)
-    missing = boundary_index[on] - to_integer(vertex_index(mesh, rotation)[on], "the index of a boundary vertex")
+    missing = boundary_index[on] - to_integer(vertex_index(mesh, rotation)[on], "the index of a boundary vertex", mesh.points[on])
     triangle = triangle_index(rotation)
     for v, amount in zip(on[missing != 0].tolist(), missing[missing != 0].tolist()):
         sign = 1 if amount > 0 else -1

@@ -98,8 +98,8 @@ class FieldOperators:
         ----------
         boundary_values : (e,) or (e, k) float64
             Only the entries of boundary edges are read.
-        correction : (m, 3) float64, optional
-            The same for all k columns.
+        correction : (m, 3) or (k, m, 3) float64, optional
+            The same for all columns, or one for each.
 
         Returns
         -------
@@ -109,8 +109,8 @@ class FieldOperators:
         x[self.fixed] = boundary_values[self.fixed]
         right = -(self.coupling @ x[self.fixed])
         if correction is not None:
-            load = -self.divergence(correction)[self.free]
-            right += load if right.ndim == 1 else load[:, None]
+            load = [-self.divergence(r)[self.free] for r in correction.reshape(-1, *self.weight.shape)]
+            right += load[0] if right.ndim == 1 else np.stack(load, axis=1)
         x[self.free] = self._factors.solve(right)
         return x
 

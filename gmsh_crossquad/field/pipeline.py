@@ -7,10 +7,11 @@ import numpy as np
 from ..records import AlignedField, CrossField, FaceMesh, Int
 from .align import Aligner, align
 from .boundary import correct_boundary
+from .cancel import cancel_pairs
 from .clearance import Clearance
 from .corners import boundary_indices
 from .operators import FieldOperators
-from .relax import cancel_pairs, leave_corners, relax_singularities
+from .relax import leave_corners, relax_singularities
 from .singularities import snap_to_vertices
 from .smooth import smooth_field
 from .surface_mesh import SurfaceMesh

@@ -23,52 +23,11 @@ from .forces import forces
 from .singularities import QUARTER, move_index, singular_vertices, walk
 from .surface_mesh import SurfaceMesh
 
-__all__ = ["cancel_pairs", "leave_corners", "relax_singularities"]
+__all__ = ["leave_corners", "relax_singularities"]
 
 #: energy that a quarter-turn singularity gains per factor e of core size
 _UNIT = np.pi / 16
 _ROUNDS = 8
-
-
-def cancel_pairs(aligner: Aligner, field: CrossField, reach: float = 4.0) -> CrossField:
-    """Merge pairs of opposite singularities closer than `reach` edges where that lowers the energy.
-
-    Parameters
-    ----------
-    aligner : Aligner
-    field : CrossField
-        Aligned and harmonic.
-
-    Returns
-    -------
-    CrossField
-        Aligned and harmonic.
-    """
-    mesh, operators = aligner.mesh, aligner.operators
-    local = np.sqrt(2.0 * mesh.area.mean())
-    kept: set[tuple[int, int]] = set()
-    for _ in range(100):
-        vertices, index = singular_vertices(mesh, field.rotation)
-        p = mesh.points[vertices]
-        far = np.hypot(*(p[:, None] - p[None]).transpose(2, 0, 1))
-        pairs = [
-            (float(far[i, j]), i, j)
-            for i, j in zip(*np.nonzero((index[:, None] > 0) & (index[None] < 0) & (far < reach * local)))
-            if (int(vertices[i]), int(vertices[j])) not in kept
-        ]
-        if not pairs:
-            return field
-        _, i, j = min(pairs)
-        kept.add((int(vertices[i]), int(vertices[j])))
-        rotation = field.rotation.copy()
-        path = walk(mesh, int(vertices[i]), p[j], mesh.boundary_vertex)
-        if path[-1] != vertices[j]:
-            continue
-        move_index(mesh, rotation, path, min(int(index[i]), -int(index[j])))
-        merged = aligner.rotate(replace(field, rotation=rotation))[0]
-        if operators.energy(merged.rotation) < operators.energy(field.rotation):
-            field = merged
-    return field
 
 
 def leave_corners(

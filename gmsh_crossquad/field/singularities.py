@@ -39,12 +39,20 @@ __all__ = [
 QUARTER = 0.5 * np.pi
 
 
-def to_integer(values: Float, what: str) -> Int:
-    """Round `values` that are integers up to rounding error; LayoutError names `what` if they are not."""
+def to_integer(values: Float, what: str, places: Float | None = None) -> Int:
+    """Round `values` (k,) that are integers up to rounding error; LayoutError names `what` if they are not.
+
+    `places` (k, d) are their coordinates, for the message.
+    """
     out = np.rint(values).astype(np.int64)
-    off = float(np.abs(values - out).max(initial=0.0))
-    if off > 1e-6:
-        raise LayoutError(f"{what} is not a whole number of quarter turns (off by {off:.3g})", remedy="report the model")
+    off = np.abs(values - out)
+    if np.any(off > 1e-6):
+        worst = int(np.argmax(off))
+        raise LayoutError(
+            f"{what} is not a whole number of quarter turns (off by {off[worst]:.3g})",
+            location=None if places is None else places[worst],
+            remedy="report the model",
+        )
     return out
 
 
@@ -137,7 +145,7 @@ def walk(mesh: SurfaceMesh, start: int, goal: Float, barred: Bool) -> list[int]:
 def singular_vertices(mesh: SurfaceMesh, rotation: Float) -> tuple[Int, Int]:
     """Interior vertices with an index, and their indices in quarter turns."""
     inside = np.flatnonzero(~mesh.boundary_vertex)
-    index = to_integer(vertex_index(mesh, rotation)[inside], "the index of an interior vertex")
+    index = to_integer(vertex_index(mesh, rotation)[inside], "the index of an interior vertex", mesh.points[inside])
     return inside[index != 0], index[index != 0]
 
 
@@ -166,7 +174,11 @@ def snap_to_vertices(mesh: SurfaceMesh, rotation: Float, avoid: Bool | None = No
         q = int(index[t])
         corners = [k for k in range(3) if not mesh.boundary_vertex[mesh.triangles[t, k]]]
         if not corners:
-            raise LayoutError("a singularity lies in a triangle without interior vertex", remedy="use a finer background mesh")
+            raise LayoutError(
+                "a singularity lies in a triangle without interior vertex",
+                location=mesh.points[mesh.triangles[t]].mean(axis=0),
+                remedy="use a finer background mesh",
+            )
 
         def preference(k: int, t: int = t, q: int = q) -> tuple[bool, bool, float]:
             v = mesh.triangles[t, k]
