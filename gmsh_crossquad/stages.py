@@ -40,7 +40,7 @@ MANY_ARCS = 3_500
 ATTEMPTS = ((1.0, 1.0, True), (1.0, 0.4, True), (1.0, 1.0, False), (1.0, 0.15, True), (0.7, 1.0, True))
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.8
-MOST_WORK = 16_000
+MOST_WORK = 20_000
 
 
 @dataclass(frozen=True)
@@ -108,9 +108,11 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
     faces: dict[float, _Faces] = {}
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
+    before = watch.work
     for background, blocks, capped in ATTEMPTS:
-        if watch.work > MOST_WORK:
+        if 2 * watch.work - before > MOST_WORK:  # as much again as the last attempt took would be too much
             break
+        before = watch.work
         try:
             if background not in faces:
                 faces[background] = _faces(model, replace(options, background=options.background * background), watch, notes)
