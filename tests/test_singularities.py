@@ -132,7 +132,7 @@ def test_an_error_says_where():
     mesh = grid(3, 3)
     values = np.zeros(len(mesh.points))
     values[5] = 0.25
-    with pytest.raises(LayoutError, match="off by 0.25") as caught:
+    with pytest.raises(LayoutError, match=r"off by 0\.25") as caught:
         to_integer(values, "an index", mesh.points)
     assert caught.value.location == tuple(mesh.points[5])
 
