@@ -86,7 +86,7 @@ def poor_cells(
     Parameters
     ----------
     model, guide, divisions, evaluate, vertices
-        As for `fill`; of more than `SHOWN` divisions the cells are judged at that many.
+        As for `fill`; of more than `SHOWN` divisions the cells are judged at that many, but prescribed nodes are kept.
 
     Returns
     -------
@@ -94,7 +94,15 @@ def poor_cells(
         Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
         inner edges were straightened.
     """
-    work = _Work.start(model, guide, np.minimum(divisions, SHOWN), evaluate, vertices)
+    shown = np.minimum(divisions, SHOWN)
+    edges, _, chord, _ = guide_chords(guide.quads)
+    n = len(guide.points)
+    for curve, chain in zip(model.curves, guide.chains):
+        if curve.spacing is not None:
+            along = np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:])
+            own_chords = chord[np.searchsorted(edges[:, 0] * n + edges[:, 1], along)]
+            shown[own_chords] = divisions[own_chords]
+    work = _Work.start(model, guide, shown, evaluate, vertices)
     own = work.cells.corner_quality()
     out: Int = np.flatnonzero(work.place(own) < KEEP * np.maximum(own, POOR))
     return out
