@@ -24,6 +24,7 @@ __all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
 
 ROUNDS = 3
 GROWTH = 3
+WORTH_REFINING = 0.02
 STEEP = np.radians(60.0)
 
 Evaluate = Callable[[int, Float], Float]
@@ -122,7 +123,7 @@ def smooth_guide(
             best = (-len(report.inverted), report.min_scaled_jacobian, guide, fine)
         elif len(report.inverted) > -best[0]:
             break
-        if not len(bad) or len(bad) > 0.1 * len(guide.quads):
+        if not len(bad) or report.min_scaled_jacobian < WORTH_REFINING:
             break
         if round_ + 1 < ROUNDS:
             notes.append(f"{len(bad)} guide cells could not be filled well; their chords were refined")
