@@ -26,6 +26,7 @@ ROUNDS = 3
 GROWTH = 3
 WORTH_REFINING = 0.02
 STEEP = np.radians(60.0)
+STEEP_ROUND = np.radians(22.0)
 
 Evaluate = Callable[[int, Float], Float]
 
@@ -138,7 +139,7 @@ def smooth_guide(
 
 
 def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
-    """Guide quads with an edge on a CAD curve whose final edges turn by more than `STEEP`."""
+    """Guide quads with an edge on a CAD curve whose final edges turn by more than `STEEP` (closed curves: `STEEP_ROUND`)."""
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     keys = edges[:, 0] * n + edges[:, 1]
@@ -148,7 +149,7 @@ def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
         s, total = cumulative_turning(curve.points, curve.arclength)
         turn = np.abs(np.diff(np.interp(places, s, total)))
         row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
-        steep[row] = turn / fine[chord[row]] > STEEP
+        steep[row] = turn / fine[chord[row]] > (STEEP_ROUND if curve.closed else STEEP)
     return np.flatnonzero(steep[quad_edges].any(axis=1))
 
 

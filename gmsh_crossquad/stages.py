@@ -39,7 +39,7 @@ MANY_ARCS = 3_500
 # in which they are tried until the mesh is good
 ATTEMPTS = ((1.0, 1.0, True), (1.0, 0.4, True), (1.0, 1.0, False), (1.0, 0.15, True), (0.7, 1.0, True))
 GOOD_QUALITY = 0.02
-GOOD_FIT = 0.8
+GOOD_FIT = 0.3
 MOST_WORK = 20_000
 
 
