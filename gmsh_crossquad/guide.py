@@ -23,7 +23,9 @@ from .watch import Watch
 __all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
 
 ROUNDS = 3
+FEW = 4
 GROWTH = 3
+MOST_QUADS = 25_000
 WORTH_REFINING = 0.02
 STEEP = np.radians(60.0)
 STEEP_ROUND = np.radians(22.0)
@@ -99,13 +101,18 @@ def smooth_guide(
     finer: Int | None = None
     best: tuple[int, float, Guide, Int] | None = None
     first = 0
-    for round_ in range(ROUNDS):
+    for round_ in range(2 * ROUNDS):
         with watch.stage("guide"):
             divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer, capped=capped)
             q = quotient(tmesh, arc_divisions(chords, divisions.guide))
             first = first or len(q.quads)
             if len(q.quads) > GROWTH * first:
                 break
+            if len(q.quads) > MOST_QUADS:
+                raise LayoutError(
+                    f"the guide grid would have {len(q.quads)} cells, more than {MOST_QUADS}",
+                    remedy="the model has too many short curves or narrow places for its size",
+                )
             wrong = problems(model, tmesh, q)
             if wrong:
                 raise LayoutError(f"the guide grid is not valid ({wrong[0]})", remedy="another size may help")
@@ -115,26 +122,31 @@ def smooth_guide(
         watch.work += len(q.quads)
         with watch.stage("smooth"):
             guide, report = smooth(start, model)
-        bad = report.inverted
+        bad = folded = report.inverted
         if not len(bad):
             with watch.stage("fill"):
-                poor = poor_cells(model, guide, fine, evaluate, vertices)
+                poor, folded = poor_cells(model, guide, fine, evaluate, vertices)
                 bad = np.union1d(poor, _steep_cells(model, guide, fine))
-        if best is None or (-len(report.inverted), report.min_scaled_jacobian) > best[:2]:
-            best = (-len(report.inverted), report.min_scaled_jacobian, guide, fine)
+        if best is None or (-len(folded), report.min_scaled_jacobian) > best[:2]:
+            best = (-len(folded), report.min_scaled_jacobian, guide, fine)
         elif len(report.inverted) > -best[0]:
+            break
+        if round_ + 1 >= ROUNDS and len(bad) > FEW:
             break
         if not len(bad) or report.min_scaled_jacobian < WORTH_REFINING:
             break
-        if round_ + 1 < ROUNDS:
+        if round_ + 1 < 2 * ROUNDS:
             notes.append(f"{len(bad)} guide cells could not be filled well; their chords were refined")
         _, quad_edges, chord, _ = guide_chords(guide.quads)
         finer = divisions.guide.copy()
         finer[np.unique(coarse_chord[chord[quad_edges[bad]]])] *= 2
     assert best is not None
-    inverted, quality, guide, fine = best
-    if inverted:
-        raise MeshError("the layout cannot be laid into the faces without inverted cells", remedy="a smaller size may help")
+    folds, quality, guide, fine = best
+    if folds:
+        raise MeshError(
+            f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",
+            remedy="a smaller size may help",
+        )
     return GuideResult(guide, fine, quality, tuple(notes))
 
 

@@ -80,21 +80,24 @@ def fill(
 
 def poor_cells(
     model: Model, guide: Guide, divisions: Int, evaluate: Callable[[int, Float], Float], vertices: Float | None = None
-) -> Int:
+) -> tuple[Int, Int]:
     """Guide quads that come out of `fill` worse than they should: divide their chords and smooth the guide again.
 
     Parameters
     ----------
     model, guide, divisions, evaluate, vertices
-        As for `fill`; of more than `SHOWN` divisions the cells are judged at that many, but prescribed nodes are kept.
+        As for `fill`; of more than `SHOWN` divisions the cells are judged at that many, and of one at two, so that an edge
+        that cuts across a curve is seen; prescribed nodes are kept.
 
     Returns
     -------
-    (k,) int64
+    poor : (k,) int64
         Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
         inner edges were straightened.
+    folded : (l,) int64
+        Those of them that have an inverted fine quad.
     """
-    shown = np.minimum(divisions, SHOWN)
+    shown = np.clip(divisions, 2, SHOWN)
     edges, _, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     for curve, chain in zip(model.curves, guide.chains):
@@ -104,8 +107,8 @@ def poor_cells(
             shown[own_chords] = divisions[own_chords]
     work = _Work.start(model, guide, shown, evaluate, vertices)
     own = work.cells.corner_quality()
-    out: Int = np.flatnonzero(work.place(own) < KEEP * np.maximum(own, POOR))
-    return out
+    quality = work.place(own)
+    return np.flatnonzero(quality < KEEP * np.maximum(own, POOR)), np.flatnonzero(quality <= 0)
 
 
 @dataclass(frozen=True)
