@@ -28,7 +28,8 @@ GROWTH = 3
 MOST_QUADS = 25_000
 WORTH_REFINING = 0.02
 STEEP = np.radians(60.0)
-STEEP_ROUND = np.radians(22.0)
+STEEP_ROUND = np.radians(20.0)
+LOST = 0.016
 
 Evaluate = Callable[[int, Float], Float]
 
@@ -151,7 +152,11 @@ def smooth_guide(
 
 
 def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
-    """Guide quads with an edge on a CAD curve whose final edges turn by more than `STEEP` (closed curves: `STEEP_ROUND`)."""
+    """Guide quads at a CAD curve that the final edges do not follow well enough.
+
+    An edge may turn by `STEEP`.  A polygon of edges of length l and turning t cuts about l^2 t / 12 off per edge; where that
+    adds up to more than `LOST` of the area of a closed curve, its edges may turn by `STEEP_ROUND`.
+    """
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     keys = edges[:, 0] * n + edges[:, 1]
@@ -159,9 +164,16 @@ def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
     for curve, chain in zip(model.curves, guide.chains):
         places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
         s, total = cumulative_turning(curve.points, curve.arclength)
-        turn = np.abs(np.diff(np.interp(places, s, total)))
         row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
-        steep[row] = turn / fine[chord[row]] > (STEEP_ROUND if curve.closed else STEEP)
+        pieces = fine[chord[row]]
+        turn = np.abs(np.diff(np.interp(places, s, total))) / pieces
+        limit = STEEP
+        if curve.closed:
+            p = curve.points - curve.points[0]
+            area = 0.5 * float(np.linalg.norm(np.cross(p[:-1], p[1:]).sum(axis=0)))
+            lost = float(np.sum(np.diff(places) ** 2 / pieces * turn / 12))
+            limit = STEEP_ROUND if lost > LOST * area else STEEP
+        steep[row] = turn > limit
     return np.flatnonzero(steep[quad_edges].any(axis=1))
 
 

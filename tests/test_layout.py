@@ -16,7 +16,8 @@ from gmsh_crossquad.layout.cuts import separation_cuts
 from gmsh_crossquad.layout.divisions import chord_divisions, cumulative_turning
 from gmsh_crossquad.layout.quantize import quantize
 from gmsh_crossquad.layout.quotient import curve_chain, quotient
-from gmsh_crossquad.layout.verify import edges_of_quads, problems
+from gmsh_crossquad.layout.verify import problems
+from gmsh_crossquad.quad_edges import edges_of_quads
 from tests import tmeshes
 
 MODEL, TMESH = tmeshes.l_shape()
@@ -54,7 +55,7 @@ def test_quotient_is_the_three_grids(counts):
     q = quotient(TMESH, n)
     assert len(q.quads) == a * c + b * c + a * d
     assert problems(MODEL, TMESH, q) == []
-    edges, _ = edges_of_quads(q.quads, q.n_vertices)
+    edges, _ = edges_of_quads(q.quads)
     assert q.n_vertices - len(edges) + len(q.quads) == 1
 
 

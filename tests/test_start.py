@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from gmsh_crossquad.embed.curve_table import CurveTable
 from gmsh_crossquad.embed.quality import guide_quality
 from gmsh_crossquad.embed.rest_lengths import LEAST_RATIO, _limit, rest_lengths
-from gmsh_crossquad.embed.start import LEAST_GAP, chain_arclengths, grid_edges, laplace_start, spread_chains
+from gmsh_crossquad.embed.start import LEAST_GAP, chain_arclengths, laplace_start, spread_chains
 from gmsh_crossquad.errors import MeshError
+from gmsh_crossquad.quad_edges import edges_of_quads
 from gmsh_crossquad.records import Float, Guide, Int, Model
 from tests.smoothing_grids import curve_of, ell, fold, mapped_grid, rectangle, ring, sector, segment, shaken
 
@@ -109,9 +110,9 @@ def test_spread_chains_refuses_prescribed_nodes_in_the_wrong_order() -> None:
 
 
 def test_grid_edges() -> None:
-    edges, quad_edges = grid_edges(np.array([[0, 1, 2, 3], [1, 4, 5, 2]]))
+    edges, rows = edges_of_quads(np.array([[0, 1, 2, 3], [1, 4, 5, 2]]))
     assert edges.tolist() == [[0, 1], [0, 3], [1, 2], [1, 4], [2, 3], [2, 5], [4, 5]]
-    assert quad_edges.tolist() == [[0, 2, 4, 1], [3, 6, 5, 2]]
+    assert rows.tolist() == [[0, 2, 4, 1], [3, 6, 5, 2]]
 
 
 @pytest.mark.parametrize("make", [lambda: mapped_grid(rectangle(3.0, 1.0), 5, 4), lambda: fold(4, 1.0)])
@@ -131,10 +132,10 @@ def test_laplace_start_forgets_the_start(make) -> None:  # type: ignore[no-untyp
 
 
 def edge_lengths(guide: Guide, sides: Float) -> tuple[Int, Float]:
-    edges, quad_edges = grid_edges(guide.quads)
+    edges, rows = edges_of_quads(guide.quads)
     length = np.empty(len(edges))
-    length[quad_edges.T] = sides
-    assert (length[quad_edges.T] == sides).all(), "an edge has two rest lengths"
+    length[rows.T] = sides
+    assert (length[rows.T] == sides).all(), "an edge has two rest lengths"
     return edges, length
 
 

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeshError
+from ..quad_edges import edges_of_quads
 from ..records import Bool, Float, Guide, Int, Model
 from .curve_table import CurveTable
-from .start import chain_arclengths, grid_edges
+from .start import chain_arclengths
 
 __all__ = ["RestLengths", "rest_lengths"]
 
@@ -80,10 +81,10 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool 
     MeshError
         Where neighbours on a curve are not joined by an edge.
     """
-    edges, quad_edges = grid_edges(guide.quads)
-    count = np.bincount(quad_edges.ravel(), minlength=len(edges))
+    edges, edge_rows = edges_of_quads(guide.quads)
+    count = np.bincount(edge_rows.ravel(), minlength=len(edges))
     sides = np.log(guide.quad_size[:, [0, 1, 0, 1]])
-    own = np.bincount(quad_edges.ravel(), sides.ravel(), minlength=len(edges)) / count
+    own = np.bincount(edge_rows.ravel(), sides.ravel(), minlength=len(edges)) / count
     if actual:
         vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
         own = 0.5 * (own + 0.5 * np.log(np.einsum("ec,ec->e", vector, vector)))
@@ -100,14 +101,14 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool 
             own[rows[single]] = np.log(np.diff(places)[single])
             turning = np.diff(table.at(np.full(len(places), row), places)[0][:, 3])
             own[rows[~single]] -= np.log(np.maximum(turning[~single] / TURN, 1.0))
-    pairs = _neighbours(guide, chain_edges, edges, quad_edges)
+    pairs = _neighbours(guide, chain_edges, edges, edge_rows)
     length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held))
     chains = tuple(
         _fill_chain(length[rows], guide, model, row) if len(rows) else np.zeros(0) for row, rows in enumerate(chain_edges)
     )
     for rows, chain in zip(chain_edges, chains):
         length[rows] = chain
-    per_quad = length[quad_edges].T
+    per_quad = length[edge_rows].T
     target = 0.25 * (per_quad[0] + per_quad[2]) * (per_quad[1] + per_quad[3])
     faces = len(model.faces)
     wanted = np.bincount(guide.quad_face, target, minlength=faces)

@@ -23,33 +23,14 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import MeshError
-from ..records import Float, Guide, Int, Model
+from ..quad_edges import edges_of_quads
+from ..records import Float, Guide, Model
 from .curve_table import CurveTable
 
-__all__ = ["chain_arclengths", "grid_edges", "laplace_start", "spread_chains"]
+__all__ = ["chain_arclengths", "laplace_start", "spread_chains"]
 
 LEAST_GAP = 0.05
 """Least gap between neighbours on a curve at the start, over the even gap."""
-
-
-def grid_edges(quads: Int) -> tuple[Int, Int]:
-    """Unique edges of a quad grid.
-
-    Parameters
-    ----------
-    quads : (q, 4) int64
-
-    Returns
-    -------
-    edges : (e, 2) int64
-        Lower vertex first, in lexicographic order.
-    quad_edges : (q, 4) int64
-        Row of the edge from corner k to corner k + 1.
-    """
-    ends = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
-    keys, inverse = np.unique(ends[:, 0] * (int(quads.max()) + 1) + ends[:, 1], return_inverse=True)
-    base = int(quads.max()) + 1
-    return np.column_stack([keys // base, keys % base]), inverse.reshape(-1, 4)
 
 
 def chain_arclengths(guide: Guide, model: Model, row: int) -> Float:
@@ -133,7 +114,7 @@ def laplace_start(guide: Guide, model: Model, table: CurveTable) -> Guide:
     from scipy.sparse.linalg import splu
 
     guide = spread_chains(guide, model, table, even=True)
-    edges, _ = grid_edges(guide.quads)
+    edges, _ = edges_of_quads(guide.quads)
     n = len(guide.points)
     free = np.zeros(n, dtype=bool)
     free[guide.quads] = True

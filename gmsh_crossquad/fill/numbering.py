@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import MeshError
+from ..quad_edges import edges_of_quads
 from ..records import Bool, Guide, Int
 
 __all__ = ["GuideTopology", "Numbering", "edge_nodes", "guide_chords", "guide_topology", "number"]
@@ -39,19 +40,14 @@ def guide_chords(quads: Int) -> tuple[Int, Int, Int, int]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    start, end = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
-    n = int(quads.max(initial=-1)) + 1
-    key, inverse = np.unique(np.minimum(start, end) * n + np.maximum(start, end), return_inverse=True)
-    edges = np.stack([key // max(n, 1), key % max(n, 1)], axis=1)
-    quad_edges = inverse.reshape(-1, 4).astype(np.int64)
-    i = quad_edges[:, :2].ravel()
-    j = quad_edges[:, 2:].ravel()
+    edges, rows = edges_of_quads(quads)
+    i, j = rows[:, :2].ravel(), rows[:, 2:].ravel()
     graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(len(edges), len(edges)))
     count, label = connected_components(graph, directed=False)
     _, first = np.unique(label, return_index=True)
     rank = np.empty(count, np.int64)
     rank[np.argsort(first, kind="stable")] = np.arange(count)
-    return edges, quad_edges, rank[label], int(count)
+    return edges, rows, rank[label], int(count)
 
 
 @dataclass(frozen=True)

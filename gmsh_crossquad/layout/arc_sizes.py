@@ -6,11 +6,15 @@ not be longer than 3 L + d.  A crowd of short curves then lies among edges that 
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from ..cad.sizes import SizeMap
 from ..records import Float, Int, Model, TMesh
 from ..spatial import cKDTree
+
+if TYPE_CHECKING:
+    from ..cad.sizes import SizeMap
 
 __all__ = ["arc_sizes"]
 

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..quad_edges import edges_of_quads
 from ..records import Bool, Int
-from .verify import edges_of_quads
 
 __all__ = ["base_complex"]
 
@@ -36,12 +36,12 @@ def base_complex(quads: Int, quad_face: Int, curve_edges: Int, n_vertices: int, 
     separators : (s, 2) int64
         Edges between blocks, CAD curves included.
     """
-    edges, quad_edges = edges_of_quads(quads, n_vertices)
+    edges, edge_rows = edges_of_quads(quads)
     keys = edges[:, 0] * n_vertices + edges[:, 1]
     mark = np.zeros(len(edges), bool)
     lo, hi = curve_edges.min(axis=1), curve_edges.max(axis=1)
     mark[np.searchsorted(keys, lo * n_vertices + hi)] = True
-    flat = quad_edges.ravel()
+    flat = edge_rows.ravel()
     order = np.argsort(flat, kind="stable")
     count = np.bincount(flat, minlength=len(edges))
     first = np.concatenate([[0], np.cumsum(count)[:-1]])

@@ -14,17 +14,11 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from ..quad_edges import edges_of_quads
 from ..records import Int, Model, TMesh
 from .quotient import Quotient, curve_chain
 
-__all__ = ["edges_of_quads", "problems"]
-
-
-def edges_of_quads(quads: Int, n_vertices: int) -> tuple[Int, Int]:
-    """Edges (e, 2), lower vertex first, and the edge of side k of every quad (q, 4)."""
-    a, b = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
-    key, inverse = np.unique(np.minimum(a, b) * n_vertices + np.maximum(a, b), return_inverse=True)
-    return np.stack([key // n_vertices, key % n_vertices], axis=1), inverse.reshape(-1, 4)
+__all__ = ["problems"]
 
 
 def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
@@ -73,8 +67,8 @@ def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
         if any(len(set(x)) < 4 for x in quads.tolist()):
             out.append(where + "a quad with repeated vertices")
             continue
-        edges, quad_edges = edges_of_quads(quads, n)
-        count = np.bincount(quad_edges.ravel(), minlength=len(edges))
+        edges, edge_rows = edges_of_quads(quads)
+        count = np.bincount(edge_rows.ravel(), minlength=len(edges))
         a, b = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
         if len(np.unique(a * n + b)) != len(a):
             out.append(where + "quads are not oriented alike")
@@ -118,7 +112,7 @@ def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
         if len(wrong):
             out.append(where + f"{len(wrong)} vertices with a wrong number of quads")
         # fans: corners of a vertex connected across interior, uncut edges
-        twin_a, twin_b = _corner_links(quads, quad_edges, count, on_curve)
+        twin_a, twin_b = _corner_links(quads, edge_rows, count, on_curve)
         m = quads.size
         label = connected_components(coo_array((np.ones(len(twin_a)), (twin_a, twin_b)), shape=(m, m)), directed=False)[1]
         pairs = np.unique(np.stack([quads.ravel(), label], axis=1), axis=0)
@@ -129,9 +123,9 @@ def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
     return out
 
 
-def _corner_links(quads: Int, quad_edges: Int, count: Int, cut: np.ndarray) -> tuple[Int, Int]:
+def _corner_links(quads: Int, edge_rows: Int, count: Int, cut: np.ndarray) -> tuple[Int, Int]:
     """Pairs of corners (4 q + k) of neighbouring quads at the same vertex, across edges that are not cut."""
-    flat = quad_edges.ravel()
+    flat = edge_rows.ravel()
     order = np.argsort(flat, kind="stable")
     first = np.searchsorted(flat[order], np.arange(len(count)))
     two = np.flatnonzero((count == 2) & ~cut)
