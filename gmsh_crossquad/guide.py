@@ -107,7 +107,7 @@ def smooth_guide(
             divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer, capped=capped)
             q = quotient(tmesh, arc_divisions(chords, divisions.guide))
             first = first or len(q.quads)
-            if len(q.quads) > GROWTH * first:
+            if len(q.quads) > min(GROWTH * first, max(first, MOST_QUADS)):
                 break
             if len(q.quads) > MOST_QUADS:
                 raise LayoutError(
