@@ -100,7 +100,7 @@ def smooth_guide(
         chords = find_chords(tmesh, quotient(tmesh, coarse))
     notes: list[str] = []
     finer: Int | None = None
-    best: tuple[int, float, Guide, Int] | None = None
+    best: tuple[tuple[int, int, float], Guide, Int] | None = None
     first = 0
     for round_ in range(2 * ROUNDS):
         with watch.stage("guide"):
@@ -124,25 +124,28 @@ def smooth_guide(
         with watch.stage("smooth"):
             guide, report = smooth(start, model)
         bad = folded = report.inverted
+        steep = np.zeros(0, np.int64)
         if not len(bad):
             with watch.stage("fill"):
-                poor, folded = poor_cells(model, guide, fine, evaluate, vertices)
-                bad = np.union1d(poor, _steep_cells(model, guide, fine))
-        if best is None or (-len(folded), report.min_scaled_jacobian) > best[:2]:
-            best = (-len(folded), report.min_scaled_jacobian, guide, fine)
-        elif len(report.inverted) > -best[0]:
+                bad, folded = poor_cells(model, guide, fine, evaluate, vertices)
+                steep = _steep_chords(model, guide, fine)
+        score = (-len(folded), -len(steep), report.min_scaled_jacobian)
+        if best is None or score > best[0]:
+            best = score, guide, fine
+        elif len(report.inverted) > -best[0][0]:
             break
         if round_ + 1 >= ROUNDS and len(bad) > FEW:
             break
-        if not len(bad) or report.min_scaled_jacobian < WORTH_REFINING:
+        if not (len(bad) or len(steep)) or report.min_scaled_jacobian < WORTH_REFINING:
             break
         if round_ + 1 < 2 * ROUNDS:
-            notes.append(f"{len(bad)} guide cells could not be filled well; their chords were refined")
+            what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
+            notes.append(f"{what}; chords were refined")
         _, quad_edges, chord, _ = guide_chords(guide.quads)
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[chord[quad_edges[bad]]])] *= 2
+        finer[np.unique(coarse_chord[np.union1d(chord[quad_edges[bad]], steep)])] *= 2
     assert best is not None
-    folds, quality, guide, fine = best
+    (folds, _, quality), guide, fine = best
     if folds:
         raise MeshError(
             f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",
@@ -151,30 +154,38 @@ def smooth_guide(
     return GuideResult(guide, fine, quality, tuple(notes))
 
 
-def _steep_cells(model: Model, guide: Guide, fine: Int) -> Int:
-    """Guide quads at a CAD curve that the final edges do not follow well enough.
+def _steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
+    """Guide chords of edges on CAD curves that the final edges do not follow well enough.
 
-    An edge may turn by `STEEP`.  A polygon of edges of length l and turning t cuts about l^2 t / 12 off per edge; where that
-    adds up to more than `LOST` of the area of a closed curve, its edges may turn by `STEEP_ROUND`.
+    An edge may turn by `STEEP`.  An edge of length l that turns by t cuts about l^2 t / 12 off; where that adds up to more than
+    `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.
     """
-    edges, quad_edges, chord, _ = guide_chords(guide.quads)
+    edges, _, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     keys = edges[:, 0] * n + edges[:, 1]
-    steep = np.zeros(len(edges), bool)
-    for curve, chain in zip(model.curves, guide.chains):
+    diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
+    areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
+    face_area = np.bincount(guide.quad_face, areas, minlength=len(model.faces))
+    rows, turns = [], []
+    lost = np.zeros(len(model.curves))
+    for c, (curve, chain) in enumerate(zip(model.curves, guide.chains)):
         places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
         s, total = cumulative_turning(curve.points, curve.arclength)
         row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
         pieces = fine[chord[row]]
         turn = np.abs(np.diff(np.interp(places, s, total))) / pieces
-        limit = STEEP
-        if curve.closed:
-            p = curve.points - curve.points[0]
-            area = 0.5 * float(np.linalg.norm(np.cross(p[:-1], p[1:]).sum(axis=0)))
-            lost = float(np.sum(np.diff(places) ** 2 / pieces * turn / 12))
-            limit = STEEP_ROUND if lost > LOST * area else STEEP
-        steep[row] = turn > limit
-    return np.flatnonzero(steep[quad_edges].any(axis=1))
+        lost[c] = np.sum(np.diff(places) ** 2 / pieces * turn / 12)
+        rows.append(row)
+        turns.append(turn)
+    limit = np.full(len(model.curves), STEEP)
+    for f, face in enumerate(model.faces):
+        around = [c for loop in face.loops for c, _ in loop]
+        if lost[around].sum() > LOST * face_area[f]:
+            limit[around] = STEEP_ROUND
+    steep = np.zeros(len(edges), bool)
+    for row, turn, most in zip(rows, turns, limit):
+        steep[row] = turn > most
+    return np.unique(chord[steep])
 
 
 def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:
