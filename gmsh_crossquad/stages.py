@@ -153,7 +153,7 @@ def _mesh(
     area = sum(_area(m) for m in faces.meshes)
     guide_size = float(np.sqrt(area / GUIDE_QUADS))
     with watch.stage("quantize"):
-        block = np.maximum(options.block_size * user_size, np.minimum(np.sqrt(area) / blocks, 20 * user_size))
+        block = np.maximum(options.block_size * user_size, np.sqrt(area) / blocks)
         if len(block) > MANY_ARCS:
             block = np.maximum(0.25 * block, user_size)  # the program is much harder where most arcs are shorter than a block
         coarse = coarse_divisions(model, tmesh, np.where(size < CROWDED * user_size, size, block))
