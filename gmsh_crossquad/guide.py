@@ -22,11 +22,14 @@ from .watch import Watch
 
 __all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
 
+# refinements of a layout: twice as many rounds where only a few cells are left, no more cells than this factor allows, and only
+# of grids whose scaled Jacobian is worth it
 ROUNDS = 3
 FEW = 4
 GROWTH = 3
-MOST_QUADS = 25_000
 WORTH_REFINING = 0.02
+MOST_QUADS = 25_000
+# greatest turning of a final edge on a curve; the smaller one where the edges lose more than this part of a face's area
 STEEP = np.radians(60.0)
 STEEP_ROUND = np.radians(20.0)
 LOST = 0.016

@@ -126,7 +126,9 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         fit = curve_fit(mesh)
         score = (result.quality > GOOD_QUALITY, fit < GOOD_FIT, result.quality)
         if best is None or score > best[0]:
-            mesh = replace(mesh, notes=(*notes, *result.notes, *mesh.notes))
+            doubts = [] if score[0] else [f"some cells are poor (scaled Jacobian {result.quality:.2g})"]
+            doubts += [] if score[1] else ["some edges on curves are much longer than those beside them"]
+            mesh = replace(mesh, notes=(*notes, *result.notes, *mesh.notes, *doubts))
             best = (
                 score,
                 StagesResult(
