@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .api import mesh
     from .block_layout import Block, Edge, Layout
-    from .errors import CrossQuadError, GeometryError, InputError, LayoutError, MeshError
+    from .errors import CrossQuadError, FieldError, GeometryError, InputError, LayoutError, MeshError
     from .options import MeshOptions
     from .quality import Quality
     from .result import FaceField, MeshResult, Singularity
@@ -28,6 +28,7 @@ __version__ = "0.1.0"
 _HOME = {
     "mesh": "api",
     "CrossQuadError": "errors",
+    "FieldError": "errors",
     "GeometryError": "errors",
     "InputError": "errors",
     "LayoutError": "errors",
@@ -47,6 +48,7 @@ __all__ = [
     "CrossQuadError",
     "Edge",
     "FaceField",
+    "FieldError",
     "GeometryError",
     "InputError",
     "Layout",

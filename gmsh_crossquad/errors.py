@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["CrossQuadError", "GeometryError", "InputError", "LayoutError", "MeshError"]
+__all__ = ["CrossQuadError", "FieldError", "GeometryError", "InputError", "LayoutError", "MeshError"]
 
 
 class CrossQuadError(Exception):
@@ -55,6 +55,12 @@ class CrossQuadError(Exception):
 
 class InputError(CrossQuadError):
     """A wrong argument, option, size or path (exit status 2)."""
+
+    exit_status = 2
+
+
+class FieldError(CrossQuadError):
+    """A cross field that cannot be used: bad values, another domain, indices that do not fit together (exit status 2)."""
 
     exit_status = 2
 
