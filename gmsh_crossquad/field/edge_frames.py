@@ -1,7 +1,7 @@
 """Tangent frames at the edge midpoints of a background mesh: where a cross field from outside meets the Crouzeix–Raviart form.
 
-Angles are measured from the edge's own direction (lower to higher vertex) about the normal, so planar and curved faces are one case
-and no global frame is needed.
+Angles are measured from the edge's own direction (lower to higher vertex) about the normal, so planar and curved faces are one
+case and no global frame is needed.
 """
 
 from __future__ import annotations
