@@ -136,6 +136,10 @@ class Model:
         The faces to mesh: those in physical surfaces where there are any, else all.
     notes : tuple of str
         What the user should know (defects of the model that were mended).
+    point_names : tuple of (int, str)
+        Gmsh tag of every CAD point in a named physical group with the group's name, also of points of no wanted face.
+    face_names : tuple of tuple of str
+        Names of the physical surfaces that hold each face; empty where nobody has read them.
     """
 
     name: str
@@ -147,6 +151,8 @@ class Model:
     curves: tuple[Curve, ...]
     faces: tuple[Face, ...]
     notes: tuple[str, ...] = field(default=())
+    point_names: tuple[tuple[int, str], ...] = ()
+    face_names: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -219,6 +225,13 @@ class AlignedField:
         Closed integral of the normal derivative of the angle around every loop.
     residual : float
         Greatest misalignment on the boundary, radians.
+    given : CrossField
+        The field u that was aligned.
+    phi, psi : (e,) float64
+        The two parts of its rotation: ``field.theta = given.theta + phi + psi`` modulo pi/2.  psi vanishes on the boundary and
+        has jumps of quarter turns, which carry indices to holes and vertices; phi has none.
+    added : tuple of int
+        Singular vertices that the given field did not have, so that the indices fit.
     """
 
     field: CrossField
@@ -226,6 +239,10 @@ class AlignedField:
     periods: Int
     flux: Float
     residual: float
+    given: CrossField
+    phi: Float
+    psi: Float
+    added: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)

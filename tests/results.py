@@ -84,5 +84,16 @@ def hand_made() -> MeshResult:
         d = m.points[surface.edges[:, 1]] - m.points[surface.edges[:, 0]]
         index = np.array([1, 1, 1, 1, 1 if row == 0 else 0])
         field = CrossField(-np.arctan2(d[:, 1], d[:, 0]), np.zeros((4, 3)))
-        fields.append(AlignedField(field, index, np.zeros(1, np.int64), np.zeros(1), 0.0))
+        fields.append(
+            AlignedField(
+                field,
+                index,
+                np.zeros(1, np.int64),
+                np.zeros(1),
+                0.0,
+                field,
+                np.zeros_like(field.theta),
+                np.zeros_like(field.theta),
+            )
+        )
     return MeshResult(HandMade(model, meshes, tuple(fields), two_squares_mesh()), {"fill": 0.25}, ("a note",))

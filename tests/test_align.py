@@ -95,9 +95,9 @@ def test_free_integers_minimise_the_energy():
     mesh, operators, field, _ = holed()
     aligner = Aligner(mesh, operators, square_corners(mesh))
     closed = aligner.close(field.rotation)
-    x = aligner.solve(field.theta, closed)
+    x = aligner.solve(field.theta, closed, closed)
     basis, _ = aligner.harmonic()
-    best, periods = aligner.rotate(field)
+    best, periods, _, _ = aligner.rotate(field)
     energies = {
         (i, j): operators.energy(closed + operators.difference(x + QUARTER * basis @ [i, j]))
         for i in range(-4, 5)
@@ -145,3 +145,49 @@ def test_singularities_in_triangles_are_snapped_first():
     rotation = snap_to_vertices(mesh, prescribed(mesh, z).rotation)
     aligned = align(mesh, FieldOperators(mesh), CrossField(prescribed(mesh, z).theta, rotation), zeros(mesh))
     assert sorted(aligned.index[aligned.index != 0]) == [1, 1, 1, 1]
+
+
+def rough(mesh, vertices, index):
+    """A field with these singularities that is far from harmonic and not aligned."""
+    x, y = mesh.points.T[:, mesh.edges].mean(axis=2)
+    return prescribed(mesh, singular_angle(mesh, vertices, index) + 0.2 * np.sin(3 * x) * np.cos(2 * y) + 0.3)
+
+
+def test_a_kept_field_is_turned_by_a_harmonic_angle():
+    mesh, operators, _, vertices = holed()
+    given = rough(mesh, vertices, [1, -1])
+    aligned = align(mesh, operators, given, square_corners(mesh), given)
+    assert aligned.residual < 1e-12
+    assert [aligned.index[v] for v in vertices] == [1, -1]
+    assert np.count_nonzero(aligned.index[~mesh.boundary_vertex]) == 2
+    assert np.abs(wrap(aligned.field.theta - given.theta - aligned.phi - aligned.psi)).max() < 1e-12
+    free = operators.free
+    assert np.abs(operators.divergence(operators.difference(aligned.phi))[free]).max() < 1e-11
+    smoothest = align(mesh, operators, given, square_corners(mesh))
+    assert operators.energy(aligned.field.rotation) > operators.energy(smoothest.field.rotation)
+    assert np.array_equal(aligned.index, smoothest.index)
+
+
+def test_an_aligned_field_comes_out_as_it_went_in():
+    mesh, operators, _, vertices = holed()
+    first = align(mesh, operators, rough(mesh, vertices, [1, -1]), square_corners(mesh), rough(mesh, vertices, [1, -1]))
+    again = align(mesh, operators, first.field, square_corners(mesh), first.field)
+    assert np.abs(again.phi + again.psi).max() < 1e-12
+    assert np.abs(again.field.rotation - first.field.rotation).max() < 1e-12
+    assert not again.periods.any()
+
+
+@pytest.mark.parametrize("quarters", [-3, 2, 4])
+def test_period_of_psi_is_the_defect(quarters):
+    # + (pi/2) D with D = target - degree; the printed sign gives the opposite
+    mesh = annulus()
+    given = prescribed(mesh, (1 - quarters / 4) * np.angle(middles(mesh)))
+    aligner = Aligner(mesh, FieldOperators(mesh), zeros(mesh))
+    rotated = aligner.rotate(given, given.rotation)
+    aligned = aligner.finish(rotated, given)
+    (hole,) = aligner.holes
+    turn = aligner.operators.difference(aligned.psi) + rotated.closed - given.rotation
+    through = np.bincount(mesh.triangles.ravel(), np.roll(turn, 1, axis=1).ravel(), len(mesh.points))
+    # the hole is clockwise: the target is -4, the degree -4 + quarters, D = - quarters
+    assert through[aligner.loops[hole].vertices].sum() == pytest.approx(-quarters * QUARTER, abs=1e-11)
+    assert np.abs(aligned.psi[mesh.boundary_edge]).max() == 0.0

@@ -23,7 +23,7 @@ def graph(mesh):
 
 def aligned(mesh, wanted, vertices, index):
     aligner = Aligner(mesh, FieldOperators(mesh), wanted)
-    return aligner, aligner.rotate(prescribed(mesh, singular_angle(mesh, vertices, index)))[0]
+    return aligner, aligner.rotate(prescribed(mesh, singular_angle(mesh, vertices, index))).field
 
 
 def remaining(aligner, field):
@@ -45,7 +45,7 @@ def test_the_quadratic_form_is_the_energy(holes):
         rotation = field.rotation.copy()
         for path, n in zip(paths, amount):
             move_index(mesh, rotation, path, n)
-        after = aligner.operators.energy(aligner.rotate(CrossField(field.theta, rotation))[0].rotation)
+        after = aligner.operators.energy(aligner.rotate(CrossField(field.theta, rotation)).field.rotation)
         assert energies(np.array(amount)) == pytest.approx(after - before, rel=1e-9, abs=1e-9)
 
 

@@ -180,6 +180,15 @@ def test_edges_between_seeds_are_bisected() -> None:
 def test_a_misaligned_field_is_an_error() -> None:
     mesh = polygon_mesh(4, 4)
     field = field_of(mesh, np.full(len(midpoints(mesh)), 0.2))
-    aligned = AlignedField(field, np.zeros(len(mesh.points), np.int64), np.zeros(1, np.int64), np.zeros(1), 0.0)
+    aligned = AlignedField(
+        field,
+        np.zeros(len(mesh.points), np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(1),
+        0.0,
+        field,
+        np.zeros_like(field.theta),
+        np.zeros_like(field.theta),
+    )
     with pytest.raises(LayoutError, match="aligned"):
         laid_out(mesh, aligned)

@@ -121,7 +121,7 @@ def test_singularities_leave_a_hole():
     wanted[hole] = 0
     vertices = [at(mesh, x, y) for x, y in ((9, 9), (15, 9), (15, 15), (9, 15))]
     aligner = Aligner(mesh, operators, wanted)
-    field, _ = aligner.rotate(prescribed(mesh, singular_angle(mesh, vertices, [-1] * 4)))
+    field = aligner.rotate(prescribed(mesh, singular_angle(mesh, vertices, [-1] * 4))).field
     clearance = Clearance(mesh, [hole])
     nowhere = np.zeros(len(mesh.points), bool)
     far = singular_vertices(mesh, relax_singularities(aligner, clearance, field, [], nowhere).rotation)

@@ -1,4 +1,4 @@
-"""Rotate a cross field until it is aligned with the boundary and as smooth as its singularities allow.
+"""Rotate a cross field until it is aligned with the boundary, by as little as possible or until it is as smooth as can be.
 
 The aligned field is ``theta + x`` with one unknown x per edge.  Along a boundary loop, the domain on the left, it turns at
 vertex v by ``K_v - (pi/2) q_v`` (K_v = pi minus the angle, q_v the wanted index); summed over the loop this must equal what
@@ -8,17 +8,21 @@ the field does:
    path from it to the outer loop (an integer cocycle in `rotation`).  All defects of a component add up to 0, or the
    wanted indices contradict Poincaré–Hopf.
 2. x is then known on every boundary edge up to one constant per loop, a multiple ``m_i pi/2`` (0 on the outer loop), and
-   inside it minimises ``1/2 sum w (difference(x) + rotation)^2``.
+   inside it minimises ``1/2 sum w (difference(x) + r)^2``.  With r = the rotation of the given field and the cocycles the
+   result is harmonic: the smoothest field with these singularities.  With r = the cocycles alone x is the least rotation, and
+   the given field is kept: one that is aligned already comes out as it went in.
 3. The integers m minimise the same energy, ``1/2 (pi/2)^2 m'Am + (pi/2) g.m`` with ``A_ij = int grad a_i . grad a_j`` for a_i
    harmonic, 1 on loop i and 0 on the others, and g the flux with m = 0: the rounded real minimum, then single steps while
    they help.
 
-The result has the same interior indices, to the last integer.
+The result has the same interior indices, to the last integer.  The rotation is x = phi + psi: psi vanishes on the boundary and
+carries the cocycles, its period around hole i is ``+ (pi/2) D_i``; phi is harmonic.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,7 +42,7 @@ from .singularities import (
 from .smooth import wrap
 from .surface_mesh import SurfaceMesh
 
-__all__ = ["Aligner", "align", "closest"]
+__all__ = ["Aligner", "Rotated", "align", "closest"]
 
 _TOLERANCE = 1e-6
 
@@ -51,6 +55,26 @@ class _Loop:
     edges: Int
     component: int
     outer: bool
+
+
+class Rotated(NamedTuple):
+    """A field that was rotated onto the boundary.
+
+    Attributes
+    ----------
+    field : CrossField
+    periods : (loops,) int64
+        The integers m.
+    x : (e,) float64
+        The angle of the rotation.
+    closed : (m, 3) float64
+        The rotation of the given field and the cocycles.
+    """
+
+    field: CrossField
+    periods: Int
+    x: Float
+    closed: Float
 
 
 def _loops(mesh: SurfaceMesh) -> list[_Loop]:
@@ -117,7 +141,7 @@ class Aligner:
             move_index(self.mesh, out, path, int(defect[i]))
         return out
 
-    def solve(self, theta: Float, closed: Float) -> Float:
+    def solve(self, theta: Float, closed: Float, correction: Float) -> Float:
         """(e,) rotation x that aligns `theta` (e,) with m = 0, for a rotation (m, 3) that went through `close`."""
         through = corner_rotation(self.mesh, closed)
         boundary = np.zeros(len(self.mesh.edges))
@@ -125,7 +149,7 @@ class Aligner:
             v, e = loop.vertices, loop.edges
             step = self.turning[v] - through[v]
             boundary[e] = -wrap(theta[e[:1]]) + np.concatenate([[0.0], np.cumsum(step[1:])])
-        return self.operators.solve(boundary, closed)
+        return self.operators.solve(boundary, correction)
 
     def flux(self, rotation: Float) -> Float:
         """(loops,) closed integral of the normal derivative of the angle around every loop."""
@@ -142,24 +166,33 @@ class Aligner:
             self._basis = basis, one.T @ (self.operators.stiffness @ basis)
         return self._basis
 
-    def rotate(self, field: CrossField) -> tuple[CrossField, Int]:
-        """The aligned, harmonic field with the interior indices of `field`, and the chosen integers (loops,)."""
+    def rotate(self, field: CrossField, kept: Float | None = None) -> Rotated:
+        """The aligned field with the interior indices of `field`.
+
+        Parameters
+        ----------
+        field : CrossField
+            Without singular triangles.
+        kept : (m, 3) float64, optional
+            The part of its rotation that is kept; by default nothing is, and the result is harmonic.
+        """
         closed = self.close(field.rotation)
-        x = self.solve(field.theta, closed)
-        rotation = closed + self.operators.difference(x)
+        correction = closed if kept is None else closed - kept
+        x = self.solve(field.theta, closed, correction)
         periods = np.zeros(len(self.loops), np.int64)
         if self.holes:
             basis, energy = self.harmonic()
-            m = closest(energy, -self.flux(rotation)[self.holes] / QUARTER)
+            flux = self.flux(correction + self.operators.difference(x))
+            m = closest(energy, -flux[self.holes] / QUARTER)
             if np.any(m):
                 x = x + QUARTER * (basis @ m)
-                rotation = closed + self.operators.difference(x)
             periods[self.holes] = m
-        return CrossField(wrap(field.theta + x), rotation), periods
+        rotation = closed + self.operators.difference(x)
+        return Rotated(CrossField(wrap(field.theta + x), rotation), periods, x, closed)
 
-    def finish(self, field: CrossField, periods: Int) -> AlignedField:
-        """Check an aligned field and collect its indices."""
-        mesh = self.mesh
+    def finish(self, rotated: Rotated, given: CrossField) -> AlignedField:
+        """Check an aligned field, collect its indices and tell what turned the `given` one."""
+        mesh, field = self.mesh, rotated.field
         index = to_integer(vertex_index(mesh, field.rotation), "the index of a vertex", mesh.points)
         wrong = np.flatnonzero(mesh.boundary_vertex & (index != self.boundary_index))
         residual = float(np.abs(wrap(field.theta[self.operators.fixed])).max())
@@ -172,7 +205,11 @@ class Aligner:
                 remedy="use a finer background mesh",
             )
         check_poincare_hopf(mesh, index)
-        return AlignedField(field, index, periods, self.flux(field.rotation), residual)
+        cocycle = rotated.closed - given.rotation
+        psi = self.operators.solve(np.zeros(len(mesh.edges)), cocycle) if np.any(cocycle) else np.zeros(len(mesh.edges))
+        return AlignedField(
+            field, index, rotated.periods, self.flux(field.rotation), residual, given=given, phi=rotated.x - psi, psi=psi
+        )
 
 
 def closest(energy: Float, right: Float) -> Int:
@@ -190,7 +227,9 @@ def closest(energy: Float, right: Float) -> Int:
     return m
 
 
-def align(mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, boundary_index: Int) -> AlignedField:
+def align(
+    mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, boundary_index: Int, given: CrossField | None = None
+) -> AlignedField:
     """Align a cross field with the boundary.
 
     Parameters
@@ -202,11 +241,14 @@ def align(mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, bound
         Singularities at interior vertices (see `snap_to_vertices`); need not be aligned.
     boundary_index : (n,) int64
         Wanted index of every boundary vertex in quarter turns.
+    given : CrossField, optional
+        Keep this field (from which `field` differs by moves of indices) and rotate it as little as possible; by default the
+        result is harmonic.
 
     Returns
     -------
     AlignedField
-        Same interior indices as `field`; harmonic; aligned to rounding error.
+        Same interior indices as `field`; aligned to rounding error.
 
     Raises
     ------
@@ -216,7 +258,8 @@ def align(mesh: SurfaceMesh, operators: FieldOperators, field: CrossField, bound
     aligner = Aligner(mesh, operators, boundary_index)
     inside = ~mesh.boundary_vertex
     before = to_integer(vertex_index(mesh, field.rotation)[inside], "the index of an interior vertex", mesh.points[inside])
-    result = aligner.finish(*aligner.rotate(field))
+    rotated = aligner.rotate(field, None if given is None else given.rotation)
+    result = aligner.finish(rotated, field if given is None else given)
     changed = mesh.points[inside][result.index[inside] != before]
     if len(changed):
         raise LayoutError("alignment changed a singularity", location=changed[0], remedy="report the model")

@@ -115,7 +115,7 @@ def cancel_pairs(aligner: Aligner, field: CrossField) -> CrossField:
         for path, amount in _moves(aligner, field, graph, vertices[here], index[here]):
             move_index(mesh, rotation, path, amount)
             moved = True
-    return aligner.rotate(replace(field, rotation=rotation))[0] if moved else field
+    return aligner.rotate(replace(field, rotation=rotation)).field if moved else field
 
 
 def _moves(aligner: Aligner, field: CrossField, graph: sp.csr_matrix, vertices: Int, index: Int) -> list[tuple[list[int], int]]:

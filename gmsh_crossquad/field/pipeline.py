@@ -2,34 +2,51 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from ..records import AlignedField, CrossField, FaceMesh, Int
+from ..records import AlignedField, Bool, CrossField, FaceMesh, Float, Int
 from .align import Aligner, align
 from .boundary import correct_boundary
 from .cancel import cancel_pairs
 from .clearance import Clearance
+from .compatibility import Incompatible, add_singularities, change_boundary, misfits
 from .corners import boundary_indices
 from .operators import FieldOperators
 from .relax import leave_corners, relax_singularities
-from .singularities import snap_to_vertices
+from .singularities import singular_vertices, snap_to_vertices
 from .smooth import smooth_field
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["aligned_field"]
 
 
-def aligned_field(mesh: FaceMesh, field: CrossField | None = None, boundary_index: Int | None = None) -> AlignedField:
+def aligned_field(
+    mesh: FaceMesh,
+    field: CrossField | None = None,
+    boundary_index: Int | None = None,
+    *,
+    keep: bool = True,
+    fix: bool = False,
+    prescribed: Bool | None = None,
+) -> AlignedField:
     """The aligned cross field of a face.
 
     Parameters
     ----------
     mesh : FaceMesh
     field : CrossField, optional
-        Any cross field; its singularities are kept, so they must satisfy Poincaré–Hopf with the boundary indices.  By default the
-        smooth field, whose singularities are adapted to the boundary indices and to the room there is for blocks.
+        Any cross field; its singularities are kept.  By default the smooth field, whose singularities are adapted to the boundary
+        indices and to the room there is for blocks.
     boundary_index : (n,) int64, optional
         Wanted indices of the boundary vertices in quarter turns; by default from the opening angles of the CAD vertices.
+    keep : bool
+        Rotate a given field by as little as possible; False: make it harmonic, with the same singularities.
+    fix : bool
+        Where the singularities of a given field do not fit the boundary indices, change as few as possible (see `compatibility`).
+    prescribed : (n,) bool, optional
+        Boundary vertices whose index the user chose, which `fix` may change.
 
     Returns
     -------
@@ -37,21 +54,61 @@ def aligned_field(mesh: FaceMesh, field: CrossField | None = None, boundary_inde
 
     Raises
     ------
+    Incompatible
+        If the indices do not add up.
     LayoutError
     """
     surface = SurfaceMesh(mesh.points, mesh.triangles)
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
     if field is not None:
-        return align(surface, operators, CrossField(field.theta, snap_to_vertices(surface, field.rotation)), wanted)
-
+        return _given(surface, operators, mesh, field, wanted, keep, fix, prescribed)
     aligner = Aligner(surface, operators, wanted)
     smooth = smooth_field(surface, operators)
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
-    current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation))[0])
+    current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation)).field)
     clearance = Clearance(surface, [aligner.loops[i].vertices for i in aligner.holes])
     corners = np.flatnonzero(surface.boundary_vertex & np.isfinite(mesh.opening_angle))
     rotation, held = leave_corners(surface, clearance, current.rotation, wanted, corners, mesh.port)
-    current = aligner.rotate(CrossField(current.theta, rotation))[0]
+    current = aligner.rotate(CrossField(current.theta, rotation)).field
     current = relax_singularities(aligner, clearance, current, held, mesh.port)
-    return aligner.finish(*aligner.rotate(current))
+    return aligner.finish(aligner.rotate(current), current)
+
+
+def _given(
+    surface: SurfaceMesh,
+    operators: FieldOperators,
+    mesh: FaceMesh,
+    field: CrossField,
+    wanted: Int,
+    keep: bool,
+    fix: bool,
+    prescribed: Bool | None,
+) -> AlignedField:
+    """Align a given field: its indices onto vertices, checked against the boundary's, then one solve."""
+    rotation = snap_to_vertices(surface, field.rotation)
+    corner = surface.boundary_vertex & (mesh.vertex >= 0)
+    wrong = misfits(surface, _interior(surface, rotation), wanted, corner)
+    added: list[int] = []
+    for misfit in wrong:
+        if not fix:
+            raise Incompatible(misfit, mesh.points)
+        own = misfits(surface, _interior(surface, rotation), wanted, corner if prescribed is None else corner & prescribed)
+        back = next(m for m in own if m.component == misfit.component)
+        if back.eases:
+            wanted = change_boundary(wanted, back)
+        else:
+            clearance = Clearance(surface, [])
+            rotation, new = add_singularities(surface, clearance, rotation, misfit)
+            added += new
+    start = CrossField(field.theta, rotation)
+    aligned = align(surface, operators, start, wanted, field if keep else None)
+    return replace(aligned, given=field, added=tuple(added))
+
+
+def _interior(surface: SurfaceMesh, rotation: Float) -> Int:
+    """(n,) indices of the interior vertices, 0 on the boundary."""
+    vertices, index = singular_vertices(surface, rotation)
+    out = np.zeros(len(surface.points), np.int64)
+    out[vertices] = index
+    return out

@@ -145,7 +145,7 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
             longest = max(longest, len(path) - 1)
         if longest == 0:
             return field
-        field = aligner.rotate(replace(field, rotation=rotation))[0]
+        field = aligner.rotate(replace(field, rotation=rotation)).field
         if longest == 1:
             return field
     return field
