@@ -131,6 +131,7 @@ def read_model(options: MeshOptions) -> Model:
         for f in tags
     )
     groups = {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
+    groups_of = _group_names(2)
     asked = groups | {vertices.tags[p] for f in tags for p in points[f]}
     return Model(
         name=gmsh.model.getCurrent(),
@@ -142,7 +143,19 @@ def read_model(options: MeshOptions) -> Model:
         curves=curves,
         faces=faces,
         notes=tuple(f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied),
+        point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
+        face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
     )
+
+
+def _group_names(dim: int) -> dict[int, list[str]]:
+    """Names of the physical groups that hold each entity of a dimension."""
+    out: dict[int, list[str]] = {}
+    for _, group in gmsh.model.getPhysicalGroups(dim):
+        name = gmsh.model.getPhysicalName(dim, group)
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group) if name else ():
+            out.setdefault(abs(int(entity)), []).append(name)
+    return out
 
 
 def _wanted_faces() -> list[int]:
