@@ -180,6 +180,8 @@ class FaceMesh:
         At boundary points that are CAD vertices the angle of this sector from CAD tangents, in (0, 2 pi]; NaN elsewhere.
     port : (n,) bool
         True where the layout must have a block corner although the field is regular there.
+    seed : (n,) int64
+        Row of the points that were asked to be vertices of the face, or -1; all -1 where it is left out.
     """
 
     face: int
@@ -191,6 +193,11 @@ class FaceMesh:
     vertex: Int
     opening_angle: Float
     port: Bool
+    seed: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.seed):
+            object.__setattr__(self, "seed", np.full(len(self.points), -1))
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from .bounds import kept_bounds
 from .crossings import crossings, without_crossings
 from .lips import coincident, merged, mirrored
 from .outline import Outline, outline
+from .seeds import InnerPoints, inner_points
 from .spacing import curve_spacing, face_sizes
 from .tangents import end_directions
 from .triangulate import OPTIONS, triangulate
@@ -30,7 +31,7 @@ __all__ = ["background_meshes", "face_meshes"]
 CROSSING_ROUNDS = 6
 
 
-def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...]:
+def background_meshes(model: Model, options: MeshOptions, seeds: tuple[Float, ...] | None = None) -> tuple[FaceMesh, ...]:
     """Background meshes of all faces; the current Gmsh model and its mesh stay as they are.
 
     Parameters
@@ -38,6 +39,8 @@ def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...
     model : Model
     options : MeshOptions
         `background` is a factor on all sizes.
+    seeds : tuple of (k, 2) float64, optional
+        Local coordinates per face of points that must be vertices (`seeds.face_seeds`).
 
     Returns
     -------
@@ -48,12 +51,17 @@ def background_meshes(model: Model, options: MeshOptions) -> tuple[FaceMesh, ...
     ------
     MeshError
         Where a face cannot be triangulated.
+    FieldError
+        For a seed on the boundary of its face.
     """
     sizes = face_sizes(model, options)
-    return face_meshes(model, curve_spacing(model, options, sizes), sizes)
+    spacing = curve_spacing(model, options, sizes, inner_points(model, sizes, seeds))
+    return face_meshes(model, spacing, sizes, seeds)
 
 
-def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple[FaceMesh, ...]:
+def face_meshes(
+    model: Model, spacing: tuple[Float, ...], sizes: Float, seeds: tuple[Float, ...] | None = None
+) -> tuple[FaceMesh, ...]:
     """Background meshes of all faces from given nodes on the curves.
 
     Parameters
@@ -63,13 +71,17 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
         Arc lengths of the nodes of every curve.
     sizes : (f,) float64
         Greatest size of triangles in every face.
+    seeds : tuple of (k, 2) float64, optional
+        Local coordinates per face of points that must be vertices.
 
     Raises
     ------
     MeshError
         Where a face cannot be triangulated.
+    FieldError
+        For a seed on the boundary of its face.
     """
-    whole, shapes, merges = _outlines(model, spacing)
+    whole, shapes, merges = _outlines(model, spacing, inner_points(model, sizes, seeds))
     with kept_bounds(), session.options(**OPTIONS):
         made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
     # everything that follows is done for all faces together
@@ -106,14 +118,17 @@ def face_meshes(model: Model, spacing: tuple[Float, ...], sizes: Float) -> tuple
     return tuple(out)
 
 
-def _outlines(model: Model, spacing: tuple[Float, ...]) -> tuple[list[Outline], list[Outline], list[Int]]:
+def _outlines(
+    model: Model, spacing: tuple[Float, ...], inner: tuple[InnerPoints, ...]
+) -> tuple[list[Outline], list[Outline], list[Int]]:
     """Outlines of all faces, whole and merged, with the merged points; curves whose segments cross others get more nodes."""
     doubled = coincident(model)
     bad: list[tuple[int, Outline, Int]] = []
     for _ in range(CROSSING_ROUNDS + 1):
         for _, shape, pairs in bad:
             spacing = without_crossings(spacing, shape, pairs)
-        whole = [outline(model, row, mirrored(model, spacing, doubled)) for row in range(len(model.faces))]
+        nodes = mirrored(model, spacing, doubled)
+        whole = [outline(model, row, nodes, inner[row]) for row in range(len(model.faces))]
         shapes, merges = zip(*(merged(shape, doubled) for shape in whole), strict=True)
         found = [(row, shape, crossings(shape)) for row, shape in enumerate(shapes)]
         bad = [item for item in found if len(item[2])]
@@ -134,9 +149,9 @@ def _face_mesh(model: Model, row: int, shape: Outline, point: Int, mesh: Surface
     mesh came from, or -1.
     """
     boundary, curve, arclength, start = _boundary(mesh, shape, point, source, model.faces[row].tag)
-    vertex = np.full(len(mesh.points), -1)
-    for inner in shape.embedded_points:
-        vertex[source == point[inner]] = shape.vertex[inner]
+    vertex, seed = np.full(len(mesh.points), -1), np.full(len(mesh.points), -1)
+    for k, inner in enumerate(point[shape.embedded_points].tolist()):
+        vertex[source == inner], seed[source == inner] = shape.inner.vertex[k], shape.inner.seed[k]
     vertex[boundary[:, 0]] = shape.vertex[start]
     angle = _opening_angles(model, row, mesh, boundary, curve, arclength, vertex)
     asked = (vertex >= 0) & model.vertex_ports[np.maximum(vertex, 0)]
@@ -151,6 +166,7 @@ def _face_mesh(model: Model, row: int, shape: Outline, point: Int, mesh: Surface
         vertex=vertex,
         opening_angle=angle,
         port=asked & (smooth | ~mesh.boundary_vertex),
+        seed=seed,
     )
 
 

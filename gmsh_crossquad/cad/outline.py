@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..records import Float, Int, Model
+from .seeds import InnerPoints
 
 __all__ = ["Outline", "outline"]
 
@@ -33,6 +34,8 @@ class Outline:
         Segments inside the face.
     embedded_points : (i,) int64
         Points inside the face that are on no curve of it.
+    inner : InnerPoints
+        The same points: what they are, and how fine the triangles are there.
     area : float
         Area of the polygons.
     """
@@ -45,10 +48,11 @@ class Outline:
     loops: tuple[tuple[Int, Int], ...]
     embedded: Int
     embedded_points: Int
+    inner: InnerPoints
     area: float
 
 
-def outline(model: Model, row: int, spacing: tuple[Float, ...]) -> Outline:
+def outline(model: Model, row: int, spacing: tuple[Float, ...], inner: InnerPoints) -> Outline:
     """Nodes and segments of face `row`.
 
     Parameters
@@ -57,6 +61,8 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...]) -> Outline:
     row : int
     spacing : tuple of (k + 1,) float64
         Arc lengths of the nodes of every curve, 0 and the length included.
+    inner : InnerPoints
+        Those of the face.
     """
     face = model.faces[row]
     used = list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
@@ -68,16 +74,17 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...]) -> Outline:
     n_points, n_segments = len(vertex), 0
     for c in used:
         record, s = model.curves[c], spacing[c]
-        inner = n_points + np.arange(len(s) - 2)
-        chain = np.concatenate([[point_of[record.start]], inner, [point_of[record.end]]])
+        between = n_points + np.arange(len(s) - 2)
+        chain = np.concatenate([[point_of[record.start]], between, [point_of[record.end]]])
         world.append(record.at(s[1:-1]))
         segments.append(np.stack([chain[:-1], chain[1:]], axis=1))
         curve.append(np.full(len(s) - 1, c))
         arclength.append(np.stack([s[:-1], s[1:]], axis=1))
         rows[c] = n_segments + np.arange(len(s) - 1)
-        n_points += len(inner)
+        n_points += len(between)
         n_segments += len(s) - 1
-    points = face.local(np.concatenate(world))
+    seeded = inner.seed >= 0
+    points = np.concatenate([face.local(np.concatenate(world)), inner.points[seeded]])
     pairs = np.concatenate(segments)
     loops = []
     area = 0.0
@@ -89,12 +96,13 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...]) -> Outline:
         loops.append((order, signs))
     return Outline(
         points=points,
-        vertex=np.concatenate([vertex, np.full(n_points - len(vertex), -1)]),
+        vertex=np.concatenate([vertex, np.full(len(points) - len(vertex), -1)]),
         segments=pairs,
         curve=np.concatenate(curve),
         arclength=np.concatenate(arclength),
         loops=tuple(loops),
         embedded=np.concatenate([rows[c] for c in face.embedded_curves]) if face.embedded_curves else np.zeros(0, np.int64),
-        embedded_points=np.array([point_of[v] for v in face.embedded_points], np.int64),
+        embedded_points=np.array([*(point_of[v] for v in face.embedded_points), *range(n_points, len(points))], np.int64),
+        inner=inner,
         area=area,
     )

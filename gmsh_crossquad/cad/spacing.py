@@ -6,6 +6,7 @@ The spacing h along the curves is the greatest function that keeps
 - a bounded turning per segment, and a least number of segments per curve,
 - a part of the gap between boundary parts that face each other (`gaps`),
 - a part of all this at sharp and re-entrant corners and at the tips of cracks, where the field is singular,
+- the sizes at points inside the faces where the field may be singular (`seeds`),
 
 and that grows with a bounded slope: ``h(x) <= h(y) + g |x - y|``.  That bound is a shortest-path problem: on the graph of
 neighbouring cells, with edge weights ``g |x - y|`` and an edge of weight h(y) from a source to every y, h is the distance from
@@ -20,6 +21,7 @@ from ..options import MeshOptions
 from ..records import Float, Int, Model
 from .cells import Cells, Track
 from .gaps import Neighbours, Uses, neighbours
+from .seeds import InnerPoints, inner_points
 
 __all__ = ["curve_spacing", "face_sizes"]
 
@@ -74,7 +76,9 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
     return out * options.background
 
 
-def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None) -> tuple[Float, ...]:
+def curve_spacing(
+    model: Model, options: MeshOptions, sizes: Float | None = None, inner: tuple[InnerPoints, ...] | None = None
+) -> tuple[Float, ...]:
     """Background nodes of all curves, the same for all faces of a curve.
 
     Parameters
@@ -84,6 +88,8 @@ def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None
         `background` is a factor on all sizes.
     sizes : (f,) float64, optional
         What `face_sizes` returns.
+    inner : tuple of InnerPoints, optional
+        Those of all faces; default: the embedded CAD points.
 
     Returns
     -------
@@ -92,6 +98,7 @@ def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None
         others, 1 on a short piece of a chain that hardly bends.
     """
     sizes = face_sizes(model, options) if sizes is None else sizes
+    inner = inner_points(model, sizes) if inner is None else inner
     track, uses = Track(model), Uses.of(model)
     coarsest = np.full(len(model.curves), np.inf)
     np.minimum.at(coarsest, uses.curve, sizes[uses.face])
@@ -107,8 +114,9 @@ def curve_spacing(model: Model, options: MeshOptions, sizes: Float | None = None
     factor = GAP * options.background
     for round_ in range(ROUNDS):
         near = neighbours(model, cells, uses)
+        most = np.minimum(base[cells.curve], _beside(model, cells, uses, inner))
         for _ in range(20):
-            h = _limited(model, track, cells, near, base, corner, factor, options.background)
+            h = _limited(model, track, cells, near, base, most, corner, factor, options.background)
             nodes = float((cells.length / h).sum())
             # too many: what narrow gaps ask for may be coarser, a little in favour of speed, much to stay within bounds
             if nodes <= budget or (factor >= WIDE_GAP * options.background and nodes <= MAX_NODES + budget):
@@ -185,15 +193,34 @@ def _corner_sizes(model: Model, uses: Uses, base: Float) -> Float:
     return out
 
 
+def _beside(model: Model, cells: Cells, uses: Uses, inner: tuple[InnerPoints, ...]) -> Float:
+    """Spacing (n,) that the points inside the faces of a cell's curve ask for, infinite where they do not."""
+    out = np.full(len(cells.curve), np.inf)
+    for row, (face, own) in enumerate(zip(model.faces, inner, strict=True)):
+        mine = np.flatnonzero(np.isin(cells.curve, uses.curve[uses.face == row]))
+        middle = face.local(cells.middle[mine])
+        for point, size in zip(own.points, own.size.tolist(), strict=True):
+            out[mine] = np.minimum(out[mine], size + GROWTH * np.sqrt(((middle - point) ** 2).sum(axis=1)))
+    return out
+
+
 def _limited(
-    model: Model, track: Track, cells: Cells, near: Neighbours, base: Float, corner: Float, factor: float, background: float
+    model: Model,
+    track: Track,
+    cells: Cells,
+    near: Neighbours,
+    base: Float,
+    most: Float,
+    corner: Float,
+    factor: float,
+    background: float,
 ) -> Float:
-    """Spacing (n,) on every cell."""
+    """Spacing (n,) on every cell; `most` is the greatest one allowed."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
     n, v = len(cells.curve), len(model.vertices)
-    h = np.concatenate([base[cells.curve], corner])
+    h = np.concatenate([most, corner])
     # a turn that is far smaller than the cells around it (a knot of a spline) is passed over
     rate = np.clip(track.turning_rate(cells), 1e-12, TURN / (SMALL_TURN * base[cells.curve]))
     small = base[cells.curve] / 3.0

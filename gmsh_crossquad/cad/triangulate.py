@@ -78,7 +78,9 @@ def triangulate(shape: Outline, h_max: float, tag: int) -> tuple[Float, Int]:
     total = np.bincount(shape.segments.ravel(), np.repeat(length, 2), len(unit))
     count = np.bincount(shape.segments.ravel(), minlength=len(unit))
     known = count > 0
-    size = SizeField(unit[known], total[known] / count[known], h_max / scale)
+    inner = shape.inner.size / scale
+    places = np.concatenate([unit[known], unit[shape.embedded_points]])
+    size = SizeField(places, np.concatenate([total[known] / count[known], inner]), h_max / scale)
     problem = ""
     for algorithm in ALGORITHMS:
         try:
