@@ -18,7 +18,7 @@ from ..records import Float
 if TYPE_CHECKING:
     from ..field.edge_frames import EdgeFrames
 
-__all__ = ["Plane", "extent", "plane_axes", "plane_of"]
+__all__ = ["Plane", "angle_arms", "extent", "plane_axes", "plane_of"]
 
 #: greatest deviation of a plane face: of its unit normals, and of its points over its extent
 _FLAT = 1e-6
@@ -90,3 +90,13 @@ def plane_of(frames: EdgeFrames, what: str) -> Plane:
         if flat and np.abs(frames.normal - plane.normal).max() <= _FLAT:
             return plane
     raise FieldError(f"{what} needs a planar face", entity=(2, frames.face), remedy="use another cross field on curved faces")
+
+
+def angle_arms(frames: EdgeFrames, angle: Float) -> Float:
+    """(n, 3) unit vectors at angles (n,) from the x axis, in the plane of a face.
+
+    On a plane other than xy the angle is measured from the projected x axis, about the normal whose last coordinate is positive.
+    """
+    plane = plane_of(frames, "a field of angles")
+    x, y = plane.axes if plane.upright else plane.axes * [[1.0], [-1.0]]
+    return np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
