@@ -10,8 +10,8 @@ round, which makes a singularity.  Near a singularity a few such turns are norma
 
 - if more than a fifth of the triangles turn by more than 36 degrees between two of their edges (in a random field one half do,
   in a resolved one only those around singularities): the triangles are too coarse for the field;
-- if more than 12 adjacent triangles turn by more than 40.5 degrees: there the field jumps along a curve, like the quarter
-  angle of a gradient that vanishes along it.
+- if more than 12 triangles that hang together turn by more than 40.5 degrees: there the field jumps along a curve, like the
+  quarter angle of a gradient that vanishes along it.
 """
 
 from __future__ import annotations
@@ -84,8 +84,7 @@ def check_turns(frames: EdgeFrames, field: CrossField) -> CrossField:
             location=_middle(frames, coarse).tolist(),
             remedy="give a smoother field, or use a finer background mesh",
         )
-    mesh = frames.surface
-    jump = largest_cluster(mesh.edge_half_edges[~mesh.boundary_edge] // 3, turn > JUMP_TURN)
+    jump = largest_cluster(frames.surface.triangles, turn > JUMP_TURN)
     if jump.sum() > LONGEST_JUMP:
         raise FieldError(
             "the field jumps by 45 degrees along a curve",
@@ -101,13 +100,15 @@ def _middle(frames: EdgeFrames, triangles: Bool) -> Float:
     return frames.points[frames.surface.triangles[np.flatnonzero(triangles)[0]]].mean(axis=0)
 
 
-def largest_cluster(pairs: Int, wanted: Bool) -> Bool:
-    """(m,) the largest set of wanted triangles that hang together, where `pairs` (p, 2) are neighbours."""
+def largest_cluster(triangles: Int, wanted: Bool) -> Bool:
+    """(m,) the largest set of wanted triangles (rows of `triangles` (m, 3)) that hang together by vertices."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    a, b = pairs[wanted[pairs].all(axis=1)].T
+    row = np.flatnonzero(wanted)
+    vertex = triangles[row]
     n = len(wanted)
-    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), (n, n)), directed=False)[1]
-    count = np.bincount(label[wanted], minlength=1)
-    return wanted & (label == int(np.argmax(count)))
+    size = n + int(triangles.max()) + 1
+    links = coo_matrix((np.ones(vertex.size), (np.repeat(row, 3), n + vertex.ravel())), (size, size))
+    label = connected_components(links, directed=False)[1][:n]
+    return wanted & (label == int(np.argmax(np.bincount(label[wanted], minlength=1))))

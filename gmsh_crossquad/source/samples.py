@@ -124,21 +124,15 @@ class Samples:
         return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1)
 
     @cached_property
-    def _sides(self) -> tuple[Int, Int, Int]:
-        """Sides (3 m, 2) of all triangles by nodes, in sorted order; their triangles (3 m,); first of each group of equal ones."""
-        nodes = self._node[self.triangles]
-        pair = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
-        order = np.lexsort((pair[:, 1], pair[:, 0]))
-        pair = pair[order]
-        new = np.concatenate([[True], (pair[1:] != pair[:-1]).any(axis=1)])
-        return pair, order // 3, np.flatnonzero(new)
-
-    @cached_property
     def _rim(self) -> Bool:
         """(nodes,) True on the boundary of the mesh (nodes of sides that have one triangle)."""
-        pair, _, first = self._sides
-        out = np.zeros(self._node.max() + 1, bool)
-        out[pair[first[np.diff(np.append(first, len(pair))) == 1]]] = True
+        nodes = self._node[self.triangles]
+        pair = np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+        count = self._node.max() + 1
+        side, times = np.unique(pair[:, 0] * count + pair[:, 1], return_counts=True)
+        single = side[times == 1]
+        out = np.zeros(count, bool)
+        out[single // count] = out[single % count] = True
         return out
 
     def on(self, frames: EdgeFrames) -> CrossField:
@@ -231,17 +225,11 @@ class Samples:
                 entity=(2, frames.face),
                 remedy="its mesh is too coarse for its singularities: give it on a finer one",
             )
-        jumps = np.zeros(len(self.triangles), bool)
-        jumps[used] = turn > JUMP_TURN
-        if jumps.sum() <= LONGEST_JUMP:
-            return
-        pair, triangle, _ = self._sides
-        same = np.flatnonzero((pair[1:] == pair[:-1]).all(axis=1))
-        curve = largest_cluster(np.stack([triangle[same], triangle[same + 1]], axis=1), jumps)
+        curve = largest_cluster(self._node[self.triangles[used]], turn > JUMP_TURN)
         if curve.sum() > LONGEST_JUMP:
             raise FieldError(
                 "the field jumps by 45 degrees along a curve",
                 entity=(2, frames.face),
-                location=self.locator.centroid[np.flatnonzero(curve)[0]].tolist(),
+                location=self.locator.centroid[used[curve][0]].tolist(),
                 remedy="give a smoother field, or give it on a finer mesh",
             )
