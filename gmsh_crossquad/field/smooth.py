@@ -9,6 +9,8 @@ length, and repeat with a smaller tau,
 
 The unknowns are the edge midpoints (Crouzeix–Raviart), so that a corner has both its directions.  In the plane z is taken in
 the global frame: one real matrix with the real and imaginary part as two right-hand sides.
+
+Diffusion has no core size.  With a given epsilon it is the start for a minimisation of the energy itself (`ginzburg_landau`).
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..records import CrossField, Float
+from .ginzburg_landau import minimise_energy
 from .operators import FieldOperators, factor
 from .singularities import QUARTER
 from .surface_mesh import SurfaceMesh
@@ -44,7 +47,7 @@ def from_angles(mesh: SurfaceMesh, theta: Float) -> CrossField:
     return CrossField(wrap(theta), wrap(np.roll(angle, -1, axis=1) - angle))
 
 
-def smooth_field(mesh: SurfaceMesh, operators: FieldOperators) -> CrossField:
+def smooth_field(mesh: SurfaceMesh, operators: FieldOperators, epsilon: float | None = None) -> CrossField:
     """The smooth boundary-aligned cross field of a plane mesh.
 
     Parameters
@@ -53,6 +56,9 @@ def smooth_field(mesh: SurfaceMesh, operators: FieldOperators) -> CrossField:
         With (n, 2) points.
     operators : FieldOperators
         Of the same mesh.
+    epsilon : float, optional
+        Core size of singularities, in the units of the mesh: the energy with this epsilon is minimised, starting from the
+        field of the diffusion.
 
     Returns
     -------
@@ -77,6 +83,8 @@ def smooth_field(mesh: SurfaceMesh, operators: FieldOperators) -> CrossField:
             if change < 0.02:
                 break
     z[free] = inner
+    if epsilon is not None:
+        z, _ = minimise_energy(mesh, operators, z, epsilon)
     theta = 0.25 * np.arctan2(z[:, 1], z[:, 0]) - direction
     theta[operators.fixed] = 0.0
     return from_angles(mesh, theta)
