@@ -3,7 +3,7 @@
     E(z) = 1/2 int |grad z|^2 + 1/(4 eps^2) int (|z|^2 - 1)^2
 
 over z = exp(4 i a) at the edge midpoints (the Crouzeix–Raviart stiffness K, lumped masses M), with z given on the boundary:
-formula (1) of "Quadrilateral mesh of non-simply connected domain and non-planar surfaces from a given cross-field" (well squared).
+formula (1) of "Quadrilateral mesh of non-simply connected domain and non-planar surfaces from a given cross-field" (squared).
 
 Nonlinear conjugate gradients (Polak, Ribière), preconditioned with ``K + M / eps^2``.  Along a line the energy is a polynomial of
 degree four, whose least stationary point is found exactly: the energy falls in every step.
