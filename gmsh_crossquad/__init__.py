@@ -16,16 +16,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .api import mesh
+    from .api import cross_field, mesh
     from .block_layout import Block, Edge, Layout
     from .errors import CrossQuadError, FieldError, GeometryError, InputError, LayoutError, MeshError
+    from .face_field import FaceField, Singularity
+    from .field_result import FieldResult
     from .options import MeshOptions
     from .quality import Quality
-    from .result import FaceField, MeshResult, Singularity
+    from .result import MeshResult
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "cross_field": "api",
     "mesh": "api",
     "CrossQuadError": "errors",
     "FieldError": "errors",
@@ -37,10 +40,11 @@ _HOME = {
     "Quality": "quality",
     "Block": "block_layout",
     "Edge": "block_layout",
-    "FaceField": "result",
+    "FaceField": "face_field",
+    "FieldResult": "field_result",
     "Layout": "block_layout",
     "MeshResult": "result",
-    "Singularity": "result",
+    "Singularity": "face_field",
 }
 
 __all__ = [
@@ -49,6 +53,7 @@ __all__ = [
     "Edge",
     "FaceField",
     "FieldError",
+    "FieldResult",
     "GeometryError",
     "InputError",
     "Layout",
@@ -59,6 +64,7 @@ __all__ = [
     "Quality",
     "Singularity",
     "__version__",
+    "cross_field",
     "mesh",
 ]
 

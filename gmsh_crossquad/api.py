@@ -1,4 +1,4 @@
-"""`mesh`: the whole pipeline on the user's current Gmsh model, in place."""
+"""`mesh`: the whole pipeline on the user's current Gmsh model, in place; `cross_field`: its first stages alone."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ from .cad.files import is_running
 from .cad.put import put_mesh
 from .cad.session import MeshSnapshot, gmsh_errors, guest
 from .errors import InputError
+from .face_field import face_field
+from .field_result import FieldResult
 from .result import MeshResult
-from .stages import Watch, block_mesh
+from .session_options import session_options
+from .stages import Watch, block_mesh, face_fields
 
-__all__ = ["mesh"]
+__all__ = ["cross_field", "mesh"]
 
 
 def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = None, **options: Any) -> MeshResult:
@@ -30,7 +33,8 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     progress : callable, optional
         Called with the name of every stage when it starts.
     **options
-        Further fields of `MeshOptions`: `max_quads`, `block_size`, `background`.
+        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `max_quads`, `block_size`,
+        `background`.  What is not given here may be set in the model, as ONELAB parameters "CrossQuad/...".
 
     Returns
     -------
@@ -40,16 +44,18 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     ------
     InputError
         For a bad option, or without an initialized Gmsh session.
+    FieldError
+        For a cross field that cannot be used.
     GeometryError
         For a model that cannot be meshed as it is.
     LayoutError, MeshError
         If no mesh was found.
     """
-    checked = check_options(size=size, **options)
-    if not is_running():
-        raise InputError("there is no Gmsh session", remedy="call gmsh.initialize() and open a model first")
+    check_options(size=size, **options)
+    _check_session()
     watch = Watch(progress)
     with guest():
+        checked = session_options(size=size, **options)
         snapshot = MeshSnapshot.take()
         try:
             snapshot.clear()
@@ -60,3 +66,34 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
             snapshot.restore()
             raise
     return MeshResult(stages, dict(watch.seconds), tuple(dict.fromkeys((*stages.notes, *stages.mesh.notes))))
+
+
+def cross_field(size: float | None = None, *, progress: Callable[[str], None] | None = None, **options: Any) -> FieldResult:
+    """The aligned cross field of the current Gmsh model; model and mesh stay as they are.
+
+    Parameters
+    ----------
+    size, progress, **options
+        As for `mesh`.
+
+    Returns
+    -------
+    FieldResult
+
+    Raises
+    ------
+    CrossQuadError
+        As for `mesh`.
+    """
+    check_options(size=size, **options)
+    _check_session()
+    watch = Watch(progress)
+    with guest():
+        model, meshes, fields, notes = face_fields(session_options(size=size, **options), watch)
+    faces = tuple(face_field(model, m, a) for m, a in zip(meshes, fields, strict=True))
+    return FieldResult(faces, dict(watch.seconds), tuple(dict.fromkeys(notes)))
+
+
+def _check_session() -> None:
+    if not is_running():
+        raise InputError("there is no Gmsh session", remedy="call gmsh.initialize() and open a model first")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from .errors import InputError
@@ -35,6 +36,13 @@ def check_options(**options: Any) -> MeshOptions:
         if count != int(count):
             raise InputError(f"max_quads is {count:g}", remedy="give a whole number")
         options["max_quads"] = int(count)
+    for name in ("fix_indices", "relax"):
+        if name in options and options[name] not in (True, False, None, 0, 1):
+            raise InputError(f"{name} is {options[name]!r}", remedy="give True or False")
+    if options.get("boundary_index") is None:
+        options.pop("boundary_index", None)
+    elif not isinstance(options["boundary_index"], Mapping):
+        raise InputError(f"boundary_index is {options['boundary_index']!r}", remedy="give a dict of point tags to indices")
     return MeshOptions(**options)
 
 

@@ -1,4 +1,4 @@
-"""The command `gmsh-crossquad`: `mesh` makes a quad mesh of a model, `check` judges one.
+"""The command `gmsh-crossquad`: `mesh` makes a quad mesh of a model, `field` its cross field alone, `check` judges a mesh.
 
 This process parses the arguments and checks the paths; the work is done in a child process (see `child`).  A file appears
 under its name only when all of it is written; whatever was there before stays if anything fails.
@@ -11,7 +11,8 @@ import os
 import shutil
 import signal
 import sys
-from contextlib import suppress
+import time
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from .progress import Display
 
-__all__ = ["main", "mesh_task"]
+__all__ = ["field_task", "main", "mesh_task"]
 
 PROGRAM = "gmsh-crossquad"
 
@@ -50,13 +51,45 @@ def _parser() -> argparse.ArgumentParser:
     mesh.add_argument("--picture", metavar="PNG", help="draw cross field, block layout and mesh")
     mesh.add_argument("--vtu", metavar="VTU", help="write mesh, layout and field for ParaView")
 
+    field = commands.add_parser(
+        "field",
+        help="make the aligned cross field of a model",
+        description="Write the aligned cross field of a model, with its singularities, as Gmsh views or for ParaView.",
+    )
+    field.add_argument("model", help="model that Gmsh opens")
+    field.add_argument("-o", "--output", required=True, help="field file: .msh (Gmsh views) or .vtu")
+    field.add_argument("--picture", metavar="PNG", help="draw the given and the aligned field")
+
+    for command in (mesh, field):
+        command.add_argument(
+            "--field",
+            metavar="SOURCE",
+            help="cross field: smooth (default), singularities:(X,Y):Q,..., eigenmode:K, FILE[:ARRAY], MODULE:FUNCTION, view:TAG "
+            "(or 1=SOURCE;2=SOURCE, by surface)",
+        )
+        command.add_argument(
+            "--index",
+            action="append",
+            metavar="POINT[@SURFACE]=I",
+            help="index of a singular point, e.g. 7=1/4 or 7@2=-1/4 (may be repeated)",
+        )
+        command.add_argument(
+            "--fix-indices", action="store_true", default=None, help="change indices that do not fit together, as few as possible"
+        )
+        command.add_argument(
+            "--relax",
+            action=argparse.BooleanOptionalAction,
+            default=None,
+            help="move singular points so that the flux around holes vanishes (default: only if there is no layout otherwise)",
+        )
+
     check = commands.add_parser(
         "check", help="judge a mesh", description="Print the quality of a mesh; exit status 1 if it is bad."
     )
     check.add_argument("mesh", help="mesh file that Gmsh reads")
     check.add_argument("--model", help="the model that it is a mesh of: compare boundary, area and groups too")
 
-    for command in (mesh, check):
+    for command in (mesh, field, check):
         loudness = command.add_mutually_exclusive_group()
         loudness.add_argument("--quiet", action="store_true", help="print nothing but errors")
         loudness.add_argument("--verbose", action="store_true", help="print every stage, and tracebacks")
@@ -85,7 +118,7 @@ def main(argv: list[str] | None = None) -> int:
     verbose = bool(arguments.verbose)
     try:
         signal.signal(signal.SIGTERM, _terminate)
-        status = _mesh(arguments) if arguments.command == "mesh" else _check(arguments)
+        status = {"mesh": _mesh, "field": _field, "check": _check}[arguments.command](arguments)
         sys.stdout.flush()
         return status
     except CrossQuadError as error:
@@ -123,24 +156,75 @@ def _display(arguments: argparse.Namespace) -> Display:
 
 
 def _mesh(arguments: argparse.Namespace) -> int:
+    from .formats import MESH_FORMATS
+
+    values = _options(arguments, ("size", "max_quads", "block_size", "field", "fix_indices", "relax"))
+    answer = _run_with_outputs("cli:mesh_task", arguments, values, MESH_FORMATS)
+    if not arguments.quiet:
+        _print_outcome(arguments, answer)
+    return 0
+
+
+def _field(arguments: argparse.Namespace) -> int:
+    from .progress import print_timings
+
+    values = _options(arguments, ("field", "fix_indices", "relax"))
+    answer = _run_with_outputs("cli:field_task", arguments, values, (".msh", ".vtu"))
+    if not arguments.quiet:
+        print_timings(answer["timings"])
+        for line in answer["faces"]:
+            print(line)
+        for note in answer["notes"]:
+            print(f"note: {note}")
+    return 0
+
+
+def _options(arguments: argparse.Namespace, names: tuple[str, ...]) -> dict[str, Any]:
+    """The options that were given, checked."""
     from .arguments import check_options
+    from .errors import InputError
+
+    values = {name: getattr(arguments, name) for name in names}
+    values = {name: value for name, value in values.items() if value is not None}
+    indices = []
+    for text in arguments.index or ():
+        point, equals, value = text.partition("=")
+        point, at, face = point.partition("@")
+        try:
+            indices.append([int(point), int(face) if at else None, value.strip()])
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InputError(f"the index {text!r} is none", remedy="write POINT=1/4, or POINT@SURFACE=1/4")
+    if indices:
+        values["boundary_index"] = indices
+    check_options(**_decoded(values))
+    return values
+
+
+def _decoded(values: dict[str, Any]) -> dict[str, Any]:
+    """Options as `mesh` takes them from what went through JSON."""
+    if "boundary_index" not in values:
+        return values
+    pairs = {point if face is None else (point, face): index for point, face, index in values["boundary_index"]}
+    return {**values, "boundary_index": pairs}
+
+
+def _run_with_outputs(task: str, arguments: argparse.Namespace, values: dict[str, Any], formats: tuple[str, ...]) -> Any:
+    """Run a task in the child; its files get their names when all of them are complete."""
     from .child import run
     from .errors import InputError
-    from .formats import MESH_FORMATS, PICTURE_FORMATS, check_input, check_output, check_suffix, temporary_beside
+    from .formats import PICTURE_FORMATS, check_input, check_output, check_suffix, temporary_beside
 
-    values = {name: getattr(arguments, name) for name in ("size", "max_quads", "block_size")}
-    values = {name: value for name, value in values.items() if value is not None}
-    check_options(**values)
     check_input(arguments.model)
-    check_suffix(arguments.output, MESH_FORMATS, "mesh")
-    wanted = {"output": arguments.output}
+    wanted = {"output": (arguments.output, formats, arguments.command)}
     if arguments.picture:
-        check_suffix(arguments.picture, PICTURE_FORMATS, "picture")
-        wanted["picture"] = arguments.picture
-    if arguments.vtu:
-        check_suffix(arguments.vtu, (".vtu",), "ParaView")
-        wanted["vtu"] = arguments.vtu
-    places = {kind: check_output(path) for kind, path in wanted.items()}
+        wanted["picture"] = (arguments.picture, PICTURE_FORMATS, "picture")
+    if getattr(arguments, "vtu", None):
+        wanted["vtu"] = (arguments.vtu, (".vtu",), "ParaView")
+    for path, allowed, what in wanted.values():
+        check_suffix(path, allowed, what)
+    places = {kind: check_output(path) for kind, (path, _, _) in wanted.items()}
     if Path(os.path.realpath(arguments.model)) in places.values():
         raise InputError(f"the output {arguments.output!r} is the model itself", remedy="choose another name")
     if len(set(places.values())) < len(places):
@@ -149,7 +233,7 @@ def _mesh(arguments: argparse.Namespace) -> int:
     job = {"model": arguments.model, "options": values, "verbose": arguments.verbose}
     job |= {kind: str(path) for kind, path in unfinished.items()}
     try:
-        answer = run("cli:mesh_task", job, _display(arguments))
+        answer = run(task, job, _display(arguments))
         for kind, place in places.items():
             if place.exists():
                 shutil.copymode(place, unfinished[kind])
@@ -157,9 +241,7 @@ def _mesh(arguments: argparse.Namespace) -> int:
     finally:
         for path in unfinished.values():
             path.unlink(missing_ok=True)
-    if not arguments.quiet:
-        _print_outcome(arguments, answer)
-    return 0
+    return answer
 
 
 def _print_outcome(arguments: argparse.Namespace, answer: dict[str, Any]) -> None:
@@ -176,21 +258,26 @@ def _print_outcome(arguments: argparse.Namespace, answer: dict[str, Any]) -> Non
     )
 
 
-def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
-    """The work of ``gmsh-crossquad mesh``, in the child process."""
-    import time
-    from contextlib import contextmanager
-    from dataclasses import asdict
+class _Stages:
+    """Tells of stages as they start, and times them."""
 
-    seconds: dict[str, float] = {}
+    def __init__(self, emit: Callable[[str], None]) -> None:
+        self._emit = emit
+        self.seconds: dict[str, float] = {}
 
     @contextmanager
-    def stage(name: str) -> Iterator[None]:
-        emit(name)
+    def __call__(self, name: str) -> Iterator[None]:
+        self._emit(name)
         start = time.perf_counter()
         yield
-        seconds[name] = time.perf_counter() - start
+        self.seconds[name] = time.perf_counter() - start
 
+
+def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
+    """The work of ``gmsh-crossquad mesh``, in the child process."""
+    from dataclasses import asdict
+
+    stage = _Stages(emit)
     with stage("start"):
         from .cad.files import open_model, write_mesh
         from .cad.session import guest
@@ -199,8 +286,8 @@ def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any
             open_model(job["model"])
         with stage("load"):
             from .api import mesh
-        result = mesh(progress=emit, **job["options"])
-        seconds |= result.timings
+        result = mesh(progress=emit, **_decoded(job["options"]))
+        stage.seconds |= result.timings
         with stage("write"):
             write_mesh(job["output"])
         with stage("measure"):
@@ -211,7 +298,28 @@ def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any
         if "picture" in job:
             with stage("picture"):
                 result.picture(job["picture"])
-    return {"quality": quality, "notes": list(result.notes), "timings": seconds}
+    return {"quality": quality, "notes": list(result.notes), "timings": stage.seconds}
+
+
+def field_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
+    """The work of ``gmsh-crossquad field``, in the child process."""
+    stage = _Stages(emit)
+    with stage("start"):
+        from .cad.files import open_model
+        from .cad.session import guest
+    with guest():
+        with stage("open"):
+            open_model(job["model"])
+        with stage("load"):
+            from .api import cross_field
+        result = cross_field(progress=emit, **_decoded(job["options"]))
+        stage.seconds |= result.timings
+        with stage("write"):
+            result.write(job["output"])
+        if "picture" in job:
+            with stage("picture"):
+                result.picture(job["picture"])
+    return {"faces": [f.summary for f in result.faces], "notes": list(result.notes), "timings": stage.seconds}
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .source.base import FieldSource
 
 __all__ = ["MeshOptions"]
 
@@ -21,9 +27,22 @@ class MeshOptions:
         Wanted block edge over the target size; sets the number of blocks, never whether a layout exists.
     background : float
         Factor on the edge length of the background triangles.
+    field : FieldSource or None
+        The cross field; None for the default smooth one.
+    boundary_index : mapping of point tag or (point tag, face tag) to number
+        Indices of singular points, as fractions of a turn (multiples of 1/4).
+    fix_indices : bool
+        Change as few indices as possible where they do not fit together, instead of an error.
+    relax : bool or None
+        Move singular points that the user set: always, so that the flux around holes vanishes; never; None: only if there is no
+        layout otherwise.
     """
 
     size: float | None = None
     max_quads: int = 10_000_000
     block_size: float = 4.0
     background: float = 1.0
+    field: FieldSource | None = None
+    boundary_index: Mapping[Any, Any] = dataclasses.field(default_factory=dict)
+    fix_indices: bool = False
+    relax: bool | None = None

@@ -12,7 +12,7 @@ import numpy as np
 from .embed.quality import scaled_jacobian
 from .records import Bool, Float, Int, QuadMesh
 
-__all__ = ["Quality", "curve_edges", "is_conforming", "measure_quality", "twins"]
+__all__ = ["Quality", "curve_edges", "inner_nodes", "is_conforming", "measure_quality", "twins"]
 
 
 @dataclass(frozen=True)
@@ -112,6 +112,14 @@ def is_conforming(mesh: QuadMesh, on_curve: Bool) -> bool:
     return bool(np.array_equal(upwards, downwards) and (upwards[1:] > upwards[:-1]).all())
 
 
+def inner_nodes(mesh: QuadMesh) -> Bool:
+    """(n,) nodes on no CAD curve (embedded points are among them)."""
+    out = np.ones(len(mesh.points), bool)
+    for chain in mesh.curve_nodes:
+        out[chain] = False
+    return out
+
+
 def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     """Measure a quad mesh.
 
@@ -126,10 +134,7 @@ def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     Quality
     """
     value = scaled_jacobian(mesh.points, mesh.quads, normals[mesh.quad_face])
-    inner = np.ones(len(mesh.points), bool)
-    for chain in mesh.curve_nodes:
-        inner[chain] = False
-    inner[mesh.vertex_node[mesh.vertex_node >= 0]] = False
+    inner = inner_nodes(mesh)
     valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
     return Quality(
         nodes=len(mesh.points),

@@ -12,9 +12,9 @@ from typing import Protocol
 import numpy as np
 
 from .block_layout import Block, Edge, Layout, build_layout
-from .field.surface_mesh import SurfaceMesh
+from .face_field import FaceField, Singularity, face_field, singularities_of
 from .quality import Quality, measure_quality
-from .records import AlignedField, FaceMesh, Float, Int, Model, QuadMesh
+from .records import AlignedField, FaceMesh, Float, Model, QuadMesh
 
 __all__ = ["Block", "Edge", "FaceField", "Layout", "MeshResult", "Singularity", "Stages"]
 
@@ -30,54 +30,6 @@ class Stages(Protocol):
     def fields(self) -> Sequence[AlignedField]: ...
     @property
     def mesh(self) -> QuadMesh: ...
-
-
-@dataclass(frozen=True)
-class Singularity:
-    """A point where the cross field turns by a multiple of a quarter.
-
-    Attributes
-    ----------
-    point : (3,) float64
-    index : int
-        Quarter turns: +1 where three blocks meet, -1 where five do.
-    face : int
-        Gmsh tag of the CAD face.
-    """
-
-    point: Float
-    index: int
-    face: int
-
-    @property
-    def valence(self) -> int:
-        """Number of blocks around it."""
-        return 4 - self.index
-
-
-@dataclass(frozen=True)
-class FaceField:
-    """The cross field of one CAD face.
-
-    Attributes
-    ----------
-    face : int
-        Gmsh tag.
-    points : (n, 3) float64; triangles : (m, 3) int64
-        Background mesh.
-    places : (e, 3) float64
-        Midpoints of its edges, where the crosses sit.
-    directions : (e, 3) float64
-        Unit vector of one arm of every cross; the others are at quarter turns about `normal`.
-    normal : (3,) float64
-    """
-
-    face: int
-    points: Float
-    triangles: Int
-    places: Float
-    directions: Float
-    normal: Float
 
 
 @dataclass(frozen=True)
@@ -121,20 +73,12 @@ class MeshResult:
     @cached_property
     def field(self) -> tuple[FaceField, ...]:
         """The cross field, one record per CAD face."""
-        return tuple(_face_field(self.stages.model, m, a) for m, a in zip(self.stages.meshes, self.stages.fields, strict=True))
+        return tuple(face_field(self.stages.model, m, a) for m, a in zip(self.stages.meshes, self.stages.fields, strict=True))
 
     @cached_property
     def singularities(self) -> tuple[Singularity, ...]:
         """The singularities inside the faces."""
-        model = self.stages.model
-        out = []
-        for mesh, aligned in zip(self.stages.meshes, self.stages.fields, strict=True):
-            inner = np.ones(len(mesh.points), bool)
-            inner[mesh.boundary.ravel()] = False
-            rows = np.flatnonzero(inner & (aligned.index != 0))
-            points = _unscale(model, model.faces[mesh.face].world(mesh.points[rows]))
-            out += [Singularity(p, int(q), model.faces[mesh.face].tag) for p, q in zip(points, aligned.index[rows], strict=True)]
-        return tuple(out)
+        return tuple(s for f in self.field for s in singularities_of(f))
 
     def write_vtu(self, path: str | PathLike[str]) -> None:
         """Write mesh, layout, field and singularities for ParaView; see `gmsh_crossquad.view.vtu`."""
@@ -147,23 +91,3 @@ class MeshResult:
         from .view.picture import picture
 
         picture(self, path)
-
-
-def _unscale(model: Model, points: Float) -> Float:
-    out: Float = model.origin + model.scale * points
-    return out
-
-
-def _face_field(model: Model, mesh: FaceMesh, aligned: AlignedField) -> FaceField:
-    face = model.faces[mesh.face]
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
-    a, b = mesh.points[surface.edges[:, 0]], mesh.points[surface.edges[:, 1]]
-    angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0]) + aligned.field.theta
-    return FaceField(
-        face=face.tag,
-        points=_unscale(model, face.world(mesh.points)),
-        triangles=mesh.triangles,
-        places=_unscale(model, face.world(0.5 * (a + b))),
-        directions=np.stack([np.cos(angle), np.sin(angle)], axis=1) @ face.axes,
-        normal=np.cross(face.axes[0], face.axes[1]),
-    )

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .cad.read import read_model
 from .cad.sizes import target_sizes
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
-from .field.pipeline import aligned_field
+from .field_stage import Rule, Wishes, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
 from .guide import GuideResult, coarse_divisions, smooth_guide
@@ -29,18 +30,40 @@ from .options import MeshOptions
 from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
 from .watch import Watch
 
-__all__ = ["StagesResult", "Watch", "block_mesh"]
+__all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
+
+T = TypeVar("T")
 
 GUIDE_QUADS = 700
 BLOCKS = 12
 CROWDED = 0.5
 MANY_ARCS = 3_500
-# factors on the background's and on the blocks' edge length, and whether short curves cap the divisions of chords: in the order
-# in which they are tried until the mesh is good
-ATTEMPTS = ((1.0, 1.0, True), (1.0, 0.4, True), (1.0, 1.0, False), (1.0, 0.15, True), (0.7, 1.0, True))
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.3
 MOST_WORK = 20_000
+
+
+class Attempt(NamedTuple):
+    """Factors on the edge length of the background and of blocks, whether short curves cap the divisions of chords, and what is
+    done with a given field (see `field_of_face`)."""
+
+    background: float = 1.0
+    blocks: float = 1.0
+    capped: bool = True
+    rule: Rule = "keep"
+
+
+# in the order in which they are tried until the mesh is good
+ATTEMPTS = (Attempt(), Attempt(blocks=0.4), Attempt(capped=False), Attempt(blocks=0.15), Attempt(background=0.7))
+GIVEN_ATTEMPTS = (
+    Attempt(),
+    Attempt(rule="harmonic"),
+    Attempt(rule="relaxed"),
+    Attempt(blocks=0.4),
+    Attempt(capped=False),
+    Attempt(background=0.7, rule="harmonic"),
+    Attempt(background=0.7, rule="relaxed"),
+)
 
 
 @dataclass(frozen=True)
@@ -84,6 +107,7 @@ class _Faces:
     meshes: tuple[FaceMesh, ...]
     fields: tuple[AlignedField, ...]
     tmeshes: tuple[FaceTMesh, ...]
+    notes: tuple[str, ...]
 
 
 def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult:
@@ -104,21 +128,24 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
     with watch.stage("read"):
         model = read_model(options)
         validate(model)
+        wanted = wishes(model, options)
     notes += model.notes
-    faces: dict[float, _Faces] = {}
+    faces: dict[tuple[float, Rule], _Faces] = {}
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
     before = watch.work
-    for background, blocks, capped in ATTEMPTS:
+    for attempt in _attempts(wanted, options):
         if 2 * watch.work - before > MOST_WORK:  # as much again as the last attempt took would be too much
             break
         before = watch.work
         try:
-            if background not in faces:
-                faces[background] = _faces(model, replace(options, background=options.background * background), watch, notes)
-            found = faces[background]
-            tried = replace(options, block_size=options.block_size * blocks)
-            tmesh, coarse, result, mesh = _mesh(model, found, tried, BLOCKS / blocks, capped, watch)
+            key = attempt.background, attempt.rule
+            if key not in faces:
+                finer = replace(options, background=options.background * attempt.background)
+                faces[key] = _faces(model, finer, wanted, attempt.rule, watch, notes)
+            found = faces[key]
+            tried = replace(options, block_size=options.block_size * attempt.blocks)
+            tmesh, coarse, result, mesh = _mesh(model, found, tried, BLOCKS / attempt.blocks, attempt.capped, watch)
         except (LayoutError, MeshError) as error:
             failure = failure or error
             notes.append(f"another layout was tried, since: {error.what}")
@@ -128,7 +155,7 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         if best is None or score > best[0]:
             doubts = [] if score[0] else [f"some cells are poor (scaled Jacobian {result.quality:.2g})"]
             doubts += [] if score[1] else ["some edges on curves are much longer than those beside them"]
-            mesh = replace(mesh, notes=(*notes, *result.notes, *mesh.notes, *doubts))
+            mesh = replace(mesh, notes=(*notes, *found.notes, *result.notes, *mesh.notes, *doubts))
             best = (
                 score,
                 StagesResult(
@@ -176,38 +203,77 @@ def _area(mesh: FaceMesh) -> float:
     return 0.5 * float(np.sum(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
 
 
-def _faces(model: Model, options: MeshOptions, watch: Watch, notes: list[str]) -> _Faces:
-    """Background mesh, aligned field and T-mesh of every face; faces that fail are tried again on a finer background."""
-    n = len(model.faces)
-    done: list[tuple[FaceMesh, AlignedField, FaceTMesh] | None] = [None] * n
+def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:
+    """What is tried, in order."""
+    if not wanted.given:
+        return ATTEMPTS
+    if options.relax:
+        return tuple(a._replace(rule="relaxed") for a in ATTEMPTS)
+    return tuple(a for a in GIVEN_ATTEMPTS if a.rule != "relaxed" or options.relax is None)
+
+
+def face_fields(options: MeshOptions, watch: Watch | None = None) -> tuple[Model, list[FaceMesh], list[AlignedField], list[str]]:
+    """The aligned cross field of every face of the current Gmsh model: the first stages alone.
+
+    Returns
+    -------
+    Model, list of FaceMesh, list of AlignedField, list of str
+        The last one are notes.
+
+    Raises
+    ------
+    CrossQuadError
+    """
+    watch = watch or Watch()
+    with watch.stage("read"):
+        model = read_model(options)
+        validate(model)
+        wanted = wishes(model, options)
+    notes = list(model.notes)
+
+    def work(mesh: FaceMesh) -> tuple[FaceMesh, AlignedField, list[str]]:
+        with watch.stage("field"):
+            return mesh, *field_of_face(model, mesh, wanted, "relaxed" if options.relax else "keep")
+
+    parts = _on_all_faces(model, options, wanted, watch, notes, work)
+    return model, [p[0] for p in parts], [p[1] for p in parts], notes + [note for p in parts for note in p[2]]
+
+
+def _faces(model: Model, options: MeshOptions, wanted: Wishes, rule: Rule, watch: Watch, notes: list[str]) -> _Faces:
+    """Background mesh, aligned field and T-mesh of every face."""
+
+    def work(mesh: FaceMesh) -> tuple[FaceMesh, AlignedField, FaceTMesh, list[str]]:
+        with watch.stage("field"):
+            aligned, changes = field_of_face(model, mesh, wanted, rule)
+        with watch.stage("trace"):
+            return mesh, aligned, trace_face(mesh, aligned), changes
+
+    parts = _on_all_faces(model, options, wanted, watch, notes, work)
+    changed = tuple(note for p in parts for note in p[3])
+    return _Faces(tuple(p[0] for p in parts), tuple(p[1] for p in parts), tuple(p[2] for p in parts), changed)
+
+
+def _on_all_faces(
+    model: Model, options: MeshOptions, wanted: Wishes, watch: Watch, notes: list[str], work: Callable[[FaceMesh], T]
+) -> list[T]:
+    """What `work` makes of the background mesh of every face; faces where it fails are tried again on a finer background."""
+    done: dict[int, T] = {}
     failure: LayoutError | None = None
+    n = len(model.faces)
     for factor in (1.0, 0.7, 0.5):
-        todo = [f for f in range(n) if done[f] is None]
+        todo = [f for f in range(n) if f not in done]
         if not todo:
             break
         if failure is not None:
-            notes.append(f"{len(todo)} of {n} faces were traced again on a finer background mesh")
+            notes.append(f"{len(todo)} of {n} faces were done again on a finer background mesh")
         with watch.stage("background"):
-            meshes = background_meshes(model, replace(options, background=options.background * factor))
+            meshes = background_meshes(model, replace(options, background=options.background * factor), wanted.seeds)
         for f in todo:
             try:
-                with watch.stage("field"):
-                    aligned = aligned_field(meshes[f])
-                with watch.stage("trace"):
-                    tmesh = trace_face(meshes[f], aligned)
-                done[f] = (meshes[f], aligned, tmesh)
+                done[f] = work(meshes[f])
             except LayoutError as error:
-                failure = _located(model, f, error)
-    parts = [d for d in done if d is not None]
-    if len(parts) < n:
+                failure = located(model, f, error)
+    if len(done) < n:
         assert failure is not None
         raise failure
-    return _Faces(tuple(p[0] for p in parts), tuple(p[1] for p in parts), tuple(p[2] for p in parts))
-
-
-def _located(model: Model, face: int, error: LayoutError) -> LayoutError:
-    """The error of a face's stage with the face's tag and the place in the user's coordinates."""
-    place = error.location
-    if place is not None and len(place) == 2:
-        place = tuple((model.origin + model.scale * model.faces[face].world(np.array([place]))[0]).tolist())
-    return LayoutError(error.what, entity=error.entity or (2, model.faces[face].tag), location=place, remedy=error.remedy)
+    return [done[f] for f in range(n)]

@@ -30,6 +30,7 @@ def aligned_field(
     keep: bool = True,
     fix: bool = False,
     prescribed: Bool | None = None,
+    epsilon: float | None = None,
 ) -> AlignedField:
     """The aligned cross field of a face.
 
@@ -47,6 +48,8 @@ def aligned_field(
         Where the singularities of a given field do not fit the boundary indices, change as few as possible (see `compatibility`).
     prescribed : (n,) bool, optional
         Boundary vertices whose index the user chose, which `fix` may change.
+    epsilon : float, optional
+        Core size of the smooth field's energy, in the units of the mesh; by default it is found by diffusion.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def aligned_field(
     if field is not None:
         return _given(surface, operators, mesh, field, wanted, keep, fix, prescribed)
     aligner = Aligner(surface, operators, wanted)
-    smooth = smooth_field(surface, operators)
+    smooth = smooth_field(surface, operators, epsilon)
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
     current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation)).field)
     clearance = Clearance(surface, [aligner.loops[i].vertices for i in aligner.holes])

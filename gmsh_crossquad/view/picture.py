@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..formats import PICTURE_FORMATS, check_output, check_suffix, temporary_beside
-from .scene import Scene, build_scene
+from .scene import Scene, build_field_scene, build_scene
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..face_field import FaceField
     from ..result import MeshResult
 
-__all__ = ["draw_scene", "picture"]
+__all__ = ["draw_scene", "field_picture", "picture"]
 
 _PATIENCE = 120.0
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -39,11 +42,20 @@ def picture(result: MeshResult, path: str | os.PathLike[str]) -> None:
     InputError
         For another extension, a place that cannot be written to, or a machine with neither a working VTK nor matplotlib.
     """
+    _write(build_scene(result), path)
+
+
+def field_picture(faces: Sequence[FaceField], path: str | os.PathLike[str]) -> None:
+    """Draw a given and the aligned cross field into a PNG file; as `picture`."""
+    _write(build_field_scene(faces), path)
+
+
+def _write(scene: Scene, path: str | os.PathLike[str]) -> None:
     check_suffix(path, PICTURE_FORMATS, "picture")
     place = check_output(path)
     unfinished = temporary_beside(place)
     try:
-        draw_scene(build_scene(result), unfinished)
+        draw_scene(scene, unfinished)
         os.replace(unfinished, place)
     finally:
         unfinished.unlink(missing_ok=True)

@@ -7,21 +7,23 @@ differ in shape.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..embed.quality import scaled_jacobian
 from ..field.surface_mesh import SurfaceMesh
+from ..quality import inner_nodes
 from ..records import Float, Int
 
 if TYPE_CHECKING:
     from ..block_layout import Layout
-    from ..result import FaceField, MeshResult
+    from ..face_field import FaceField
+    from ..result import MeshResult
 
-__all__ = ["Lines", "Markers", "Panel", "Scene", "build_scene"]
+__all__ = ["Lines", "Markers", "Panel", "Scene", "build_field_scene", "build_scene"]
 
 BLUE, VERMILLION, INK, GREY = (0, 114, 178), (213, 94, 0), (30, 34, 40), (150, 158, 168)
 PAPER = (246, 247, 249)
@@ -110,7 +112,7 @@ def _quality_colours(value: Float) -> Int:
     return ((1 - bad) * np.array([228, 240, 249]) + bad * np.array(VERMILLION)).astype(np.int64)
 
 
-def _crosses(fields: tuple[FaceField, ...], cell: float, frame: Float) -> Float:
+def _crosses(fields: Sequence[FaceField], cell: float, frame: Float) -> Float:
     """Arms (k, 2, 3) of crosses at the points of a square grid.
 
     At a point with barycentric coordinates l the fourth power of the cross is ``sum_k (1 - 2 l_opposite(k)) u_k``, from its
@@ -193,7 +195,7 @@ def build_scene(result: MeshResult) -> Scene:
     sign = np.array([s.index for s in result.singularities], np.int64)
     spots = _spots(np.array([s.point for s in result.singularities]).reshape(-1, 3) @ frame.T, sign)
     valence = np.bincount(mesh.quads.ravel(), minlength=len(points))
-    inside = np.concatenate(mesh.face_nodes)
+    inside = np.flatnonzero(inner_nodes(mesh) & (valence > 0))
     corners = _spots(points[inside], 4 - valence[inside])
     tints = _block_colours(layout)
     fields = result.field
@@ -230,3 +232,38 @@ def build_scene(result: MeshResult) -> Scene:
         ),
     )
     return Scene(panels, np.stack([low[:2], high[:2]]))
+
+
+def build_field_scene(faces: Sequence[FaceField]) -> Scene:
+    """Two panels: the given cross field, and the aligned one with its singularities inside and on the boundary.
+
+    Parameters
+    ----------
+    faces : sequence of FaceField
+
+    Returns
+    -------
+    Scene
+    """
+    frame = _frame(np.array([f.normal for f in faces]))
+    offset = np.cumsum([0, *(len(f.points) for f in faces)])
+    ground = np.concatenate([f.points for f in faces]) @ frame.T
+    triangles = np.concatenate([f.triangles + o for f, o in zip(faces, offset[:-1], strict=True)])
+    flat = np.tile(np.array(PAPER), (len(triangles), 1))
+    low, high = ground.min(axis=0), ground.max(axis=0)
+    cell = float((high - low)[:2].max()) / CROSSES
+    boundary = [f.edges[SurfaceMesh(f.points, f.triangles).boundary_edge] for f in faces]
+    outline = Lines(np.concatenate([f.points[b] for f, b in zip(faces, boundary, strict=True)]) @ frame.T, INK, 2.0)
+    rows = [np.flatnonzero(f.index) for f in faces]
+    places = np.concatenate([f.points[r] for f, r in zip(faces, rows, strict=True)]) @ frame.T
+    index = np.concatenate([f.index[r] for f, r in zip(faces, rows, strict=True)])
+    inside = np.concatenate([~np.isin(r, b) for r, b in zip(rows, boundary, strict=True)])
+    count = [int(np.sum(index[inside] * sign > 0)) for sign in (1, -1)]
+    panels = []
+    for title, fields, spots in (
+        ("given field", [replace(f, directions=f.given) for f in faces], ()),
+        (f"aligned field: {count[0]} singularities of positive, {count[1]} of negative index", faces, _spots(places, index)),
+    ):
+        crosses = Lines(_crosses(fields, cell, frame) @ frame.T, BLUE, 1.1)
+        panels.append(Panel(title, ground, triangles, flat, (crosses, outline), spots))
+    return Scene(tuple(panels), np.stack([low[:2], high[:2]]))

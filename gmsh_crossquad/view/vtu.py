@@ -25,7 +25,8 @@ from ..formats import check_output, check_suffix, temporary_beside
 from ..records import Float, Int
 
 if TYPE_CHECKING:
-    from ..result import FaceField, MeshResult
+    from ..face_field import FaceField
+    from ..result import MeshResult
 
 __all__ = ["write_vtu"]
 
