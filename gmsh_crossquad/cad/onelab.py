@@ -106,7 +106,8 @@ def _of_a_file(name: str) -> bool:
 
 def _sources(path: Path) -> list[str]:
     """Texts of a script and of those that it includes; nothing where a model has none."""
-    todo, done, texts = [path], set(), []
+    todo, texts = [path], list[str]()
+    done: set[Path] = set()
     while todo and len(done) < MOST_FILES:
         file = todo.pop()
         if file in done or file.suffix.lower() not in SCRIPTS:
