@@ -135,7 +135,16 @@ def field_of_face(model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "ke
     else:
         given = source.on(edge_frames(model, mesh))
     try:
-        aligned = aligned_field(mesh, given, index, keep=rule == "keep", fix=wanted.fix, prescribed=chosen, epsilon=epsilon)
+        aligned = aligned_field(
+            mesh,
+            given,
+            index,
+            keep=rule == "keep",
+            relax=rule == "relaxed",
+            fix=wanted.fix,
+            prescribed=chosen,
+            epsilon=epsilon,
+        )
     except Incompatible as error:
         raise _named(model, mesh, error.misfit) from None
     return aligned, _changes(model, mesh, index, aligned)
@@ -212,6 +221,10 @@ def _changes(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) ->
         notes.append(f"the index of {_name(model, mesh, v)} was changed from {old} to {new}")
     for v in aligned.added:
         notes.append(f"a singularity of {quarter_text(int(aligned.index[v]))} was added at {_name(model, mesh, v)}")
+    if aligned.moved:
+        start, end = (mesh.points[list(rows)] for rows in zip(*aligned.moved))
+        far = model.scale * float(np.linalg.norm(end - start, axis=1).max())
+        notes.append(f"{len(start)} singularities of surface {model.faces[mesh.face].tag} were moved, by up to {far:.3g}")
     return notes
 
 

@@ -236,9 +236,11 @@ class AlignedField:
         The field u that was aligned.
     phi, psi : (e,) float64
         The two parts of its rotation: ``field.theta = given.theta + phi + psi`` modulo pi/2.  psi vanishes on the boundary and
-        has jumps of quarter turns, which carry indices to holes and vertices; phi has none.
+        has jumps of quarter turns, which carry indices to holes and vertices; phi has none (unless singularities were moved).
     added : tuple of int
         Singular vertices that the given field did not have, so that the indices fit.
+    moved : tuple of (int, int)
+        Where singularities of the given field were and are now.
     """
 
     field: CrossField
@@ -250,6 +252,7 @@ class AlignedField:
     phi: Float
     psi: Float
     added: tuple[int, ...] = ()
+    moved: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gmsh_crossquad.errors import LayoutError
+from gmsh_crossquad.errors import FieldError
 from gmsh_crossquad.field.operators import FieldOperators
 from gmsh_crossquad.field.pipeline import aligned_field
 from gmsh_crossquad.field.smooth import wrap
@@ -85,7 +85,7 @@ def test_a_given_field_with_a_wrong_sum_is_refused():
     mesh = models.background(models.l_shape(), 0.05)[0]
     s = surface(mesh)
     v = int(np.flatnonzero(~s.boundary_vertex)[5])
-    with pytest.raises(LayoutError, match="do not fit"):
+    with pytest.raises(FieldError, match=r"add up to \+5/4 instead of chi = 1"):
         aligned_field(mesh, prescribed(s, singular_angle(s, [v], [1])))
 
 

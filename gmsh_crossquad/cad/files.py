@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import GeometryError, MeshError
 from ..formats import check_input
 from ..records import Float, Int
+from .onelab import forget_options
 from .session import gmsh_errors, options
 
 __all__ = ["MeshArrays", "is_running", "open_model", "physical_groups", "read_mesh", "write_mesh"]
@@ -39,6 +40,7 @@ def open_model(path: str | os.PathLike[str]) -> None:
         With Gmsh's message, if Gmsh cannot read it.
     """
     check_input(path)
+    forget_options()
     with options(**{"General.AbortOnError": 2}):
         try:
             gmsh.open(os.fspath(path))

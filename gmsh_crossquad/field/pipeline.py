@@ -13,10 +13,11 @@ from .cancel import cancel_pairs
 from .clearance import Clearance
 from .compatibility import Incompatible, add_singularities, change_boundary, misfits
 from .corners import boundary_indices
+from .flux import vanish_flux
 from .operators import FieldOperators
 from .relax import leave_corners, relax_singularities
-from .singularities import singular_vertices, snap_to_vertices
-from .smooth import smooth_field
+from .singularities import QUARTER, singular_vertices, snap_to_vertices
+from .smooth import smooth_field, wrap
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["aligned_field"]
@@ -28,6 +29,7 @@ def aligned_field(
     boundary_index: Int | None = None,
     *,
     keep: bool = True,
+    relax: bool = False,
     fix: bool = False,
     prescribed: Bool | None = None,
     epsilon: float | None = None,
@@ -44,6 +46,8 @@ def aligned_field(
         Wanted indices of the boundary vertices in quarter turns; by default from the opening angles of the CAD vertices.
     keep : bool
         Rotate a given field by as little as possible; False: make it harmonic, with the same singularities.
+    relax : bool
+        Move the singularities of a given field until the flux around every hole vanishes; the field becomes harmonic.
     fix : bool
         Where the singularities of a given field do not fit the boundary indices, change as few as possible (see `compatibility`).
     prescribed : (n,) bool, optional
@@ -65,7 +69,7 @@ def aligned_field(
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
     if field is not None:
-        return _given(surface, operators, mesh, field, wanted, keep, fix, prescribed)
+        return _given(surface, operators, mesh, field, wanted, keep and not relax, relax, fix, prescribed)
     aligner = Aligner(surface, operators, wanted)
     smooth = smooth_field(surface, operators, epsilon)
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
@@ -85,6 +89,7 @@ def _given(
     field: CrossField,
     wanted: Int,
     keep: bool,
+    relax: bool,
     fix: bool,
     prescribed: Bool | None,
 ) -> AlignedField:
@@ -105,8 +110,22 @@ def _given(
             rotation, new = add_singularities(surface, clearance, rotation, misfit)
             added += new
     start = CrossField(field.theta, rotation)
+    if relax:
+        return _relaxed(Aligner(surface, operators, wanted), mesh, start, field, tuple(added))
     aligned = align(surface, operators, start, wanted, field if keep else None)
     return replace(aligned, given=field, added=tuple(added))
+
+
+def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossField, added: tuple[int, ...]) -> AlignedField:
+    """The harmonic field without flux around holes, with singularities near those of `start`."""
+    clearance = Clearance(aligner.mesh, [aligner.loops[i].vertices for i in aligner.holes])
+    moved = vanish_flux(aligner, clearance, aligner.rotate(start).field, [], mesh.port)
+    aligned = aligner.finish(aligner.rotate(moved.field), moved.field)
+    steps = tuple((int(a), int(b)) for a, b in zip(moved.start, moved.end, strict=True) if a != b)
+    x = wrap(aligned.field.theta - given.theta)
+    turn = aligned.field.rotation - given.rotation - aligner.operators.difference(x)
+    psi = aligner.operators.solve(np.zeros(len(x)), QUARTER * np.rint(turn / QUARTER))
+    return replace(aligned, given=given, phi=x - psi, psi=psi, added=added, moved=steps)
 
 
 def _interior(surface: SurfaceMesh, rotation: Float) -> Int:
