@@ -39,6 +39,10 @@ def check_options(**options: Any) -> MeshOptions:
     for name in ("fix_indices", "relax"):
         if name in options and options[name] not in (True, False, None, 0, 1):
             raise InputError(f"{name} is {options[name]!r}", remedy="give True or False")
+    if isinstance(options.get("field"), str):
+        from .source.parse import parse_text
+
+        parse_text(options["field"])
     if options.get("boundary_index") is None:
         options.pop("boundary_index", None)
     elif not isinstance(options["boundary_index"], Mapping):

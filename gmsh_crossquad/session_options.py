@@ -34,18 +34,18 @@ def session_options(**arguments: Any) -> MeshOptions:
 
 def _source(value: Any) -> FieldSource:
     """A source from whatever the user gave."""
+    from .cad.views import read_view_file, view_samples
     from .face_field import FaceField
     from .field_result import FieldResult
     from .source.known import Known
     from .source.parse import parse_field
-    from .source.per_face import PerFace
-    from .source.smooth import Smooth
 
     if isinstance(value, FieldResult):
         return Known(value.faces)
+    if isinstance(value, FaceField):
+        return Known((value,))
     if isinstance(value, (tuple, list)) and value and all(isinstance(f, FaceField) for f in value):
         return Known(tuple(value))
     if isinstance(value, Mapping):
-        faces = {int(face): _source(v) for face, v in value.items() if face is not None}
-        return PerFace(faces, _source(value[None]) if None in value else Smooth())
-    return parse_field(value)
+        value = {face: v if v is None else _source(v) for face, v in value.items()}
+    return parse_field(value, view_samples, read_view_file)
