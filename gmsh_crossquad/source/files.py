@@ -1,22 +1,32 @@
 """Cross fields in VTU and VTK files.
 
-A file of this library (`field_arrays`) comes back as it was.  In any other one an array is taken: vectors (3 components) are one
-arm of the cross, symmetric tensors (6 or 9 components; 3 on plane meshes cannot be told from vectors) give their principal
-directions, scalars are angles.  Arrays on points are preferred to those of the same name on cells.
+A file of this library (`field_arrays`) comes back as it was.  In any other one an array is taken, on points or cells (those on
+points are preferred to those of the same name on cells):
+
+    stress              vectors (2 or 3 components) are one arm of the cross, symmetric tensors (4, 6 or 9 components) give their
+                        principal directions, scalars are angles in radians
+    stress:principal    a tensor, even with 3 components: xx, yy, xy
+    principal           the only tensor
+    a,b                 two arrays of vectors: two arms
+
+Without a name the only vector or tensor is taken; a scalar has to be named, since few are angles.
 """
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 from ..errors import FieldError, InputError
 from ..field_arrays import CELL_ARRAYS, POINT_ARRAYS, field_from_arrays
 from ..formats import check_input
+from ..records import Float
 from .known import Known
 from .samples import Samples
 from .values import Kind
@@ -25,7 +35,18 @@ __all__ = ["read_field"]
 
 PRINCIPAL = "principal"
 CELLS = ("triangle", "triangle6", "quad", "quad8", "quad9")
-KINDS: dict[int, Kind] = {1: "angle", 3: "direction", 6: "tensor", 9: "tensor"}
+KINDS: dict[int, Kind] = {1: "angle", 2: "direction", 3: "direction", 4: "tensor", 6: "tensor", 9: "tensor"}
+
+
+class _Array(NamedTuple):
+    """Values (n, components) on points or cells."""
+
+    values: Float
+    where: Literal["points", "cells"]
+
+    @property
+    def kind(self) -> Kind:
+        return KINDS[self.values.shape[1]]
 
 
 def read_field(path: str | os.PathLike[str], array: str | None = None) -> Samples | Known:
@@ -36,8 +57,7 @@ def read_field(path: str | os.PathLike[str], array: str | None = None) -> Sample
     path : path
         A `.vtu` or `.vtk` file with a surface mesh.
     array : str, optional
-        Name of an array, or "principal": the only tensor.  Needed where there are several arrays, unless the file was written by
-        this library.
+        As in the module's table.  Needed where there are several arrays, unless the file was written by this library.
 
     Raises
     ------
@@ -46,8 +66,10 @@ def read_field(path: str | os.PathLike[str], array: str | None = None) -> Sample
     FieldError
         If the file cannot be read or has no field that can be used.
     """
-    check_input(path)
     name = os.fspath(path)
+    if Path(name).is_file() and Path(name).stat().st_size == 0:
+        raise FieldError(f"the file {name!r} is empty", remedy="give a field file")
+    check_input(path)
     import meshio
 
     with _reading(name):
@@ -62,47 +84,62 @@ def read_field(path: str | os.PathLike[str], array: str | None = None) -> Sample
         data: dict[str, Any] = {key: np.asarray(mesh.point_data[key]) for key in POINT_ARRAYS}
         data |= {key: np.concatenate(cell_data[key]) for key in CELL_ARRAYS}
         return Known(field_from_arrays(points, np.concatenate([mesh.cells[i].data for i in blocks]), data))
-    usable: dict[str, tuple[Any, str]] = {}
+    usable: dict[str, _Array] = {}
     for key, parts in cell_data.items():
-        usable[key] = np.concatenate(parts), "cells"
+        usable[key] = _Array(_flat(np.concatenate(parts)), "cells")
     for key, values in mesh.point_data.items():
-        usable[key] = np.asarray(values), "points"
-    usable = {key: found for key, found in usable.items() if _components(found[0]) in KINDS}
-    values, where = usable[_chosen(name, array, usable)]
-    flat = values.reshape(len(values), -1) if values.ndim > 1 else values
-    kind = KINDS[_components(values)]
-    return Samples(points, [mesh.cells[i].data for i in blocks], flat, kind, "points" if where == "points" else "cells")
+        usable[key] = _Array(_flat(values), "points")
+    usable = {key: found for key, found in usable.items() if found.values.shape[1] in KINDS}
+    values, kind, where = _chosen(name, array, usable)
+    return Samples(points, [mesh.cells[i].data for i in blocks], values, kind, where)
 
 
 @contextmanager
 def _reading(name: str) -> Iterator[None]:
-    """Whatever the reader raises (it ends the program for some formats) as one line."""
+    """Whatever the reader raises or prints (it ends the program for some formats) as one line."""
+    said = io.StringIO()
     try:
-        yield
+        with redirect_stdout(said), redirect_stderr(said):
+            yield
     except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        text = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(text.split())[:200] or type(error).__name__
         raise FieldError(f"{name!r} cannot be read ({reason})", remedy="give a .vtu or .vtk file") from error
 
 
-def _components(values: Any) -> int:
-    return int(np.prod(np.shape(values)[1:], dtype=np.int64))
+def _flat(values: Any) -> Float:
+    """(n, components)"""
+    v = np.asarray(values)
+    return v.reshape(len(v), -1) if v.size else np.zeros((len(v), 0))
 
 
-def _chosen(name: str, array: str | None, usable: dict[str, tuple[Any, str]]) -> str:
-    """The array that is meant."""
+def _chosen(name: str, array: str | None, usable: dict[str, _Array]) -> tuple[Float, Kind, Literal["points", "cells"]]:
+    """The values that are meant, their kind and place."""
     listed = ", ".join(repr(key) for key in usable) or "none"
+    if array is None:
+        array = _only(name, "vectors or tensors", [k for k, a in usable.items() if a.kind != "angle"], listed)
     if array in usable:
-        return str(array)
+        return usable[array].values, usable[array].kind, usable[array].where
     if array == PRINCIPAL:
-        tensors = [key for key, (values, _) in usable.items() if KINDS[_components(values)] == "tensor"]
-        if len(tensors) == 1:
-            return tensors[0]
-        what = "no tensor" if not tensors else f"{len(tensors)} tensors"
-        raise InputError(f"{name!r} has {what} for {PRINCIPAL!r}", remedy=f"name an array; its arrays are: {listed}")
-    if array is not None:
-        raise InputError(f"{name!r} has no array {array!r}", remedy=f"its arrays are: {listed}")
-    vectors = [key for key, (values, _) in usable.items() if KINDS[_components(values)] != "angle"]
-    several = vectors or list(usable)
-    if len(several) != 1:
-        raise InputError(f"{name!r} has {len(several)} arrays that could be the field", remedy=f"name one of: {listed}")
-    return several[0]
+        array = _only(name, "tensors", [k for k, a in usable.items() if a.kind == "tensor"], listed) + ":" + PRINCIPAL
+    base, _, word = array.rpartition(":")
+    if word == PRINCIPAL and base in usable:
+        found = usable[base]
+        if found.kind != "tensor" and found.values.shape[1] != 3:
+            raise InputError(f"the array {base!r} of {name!r} has no tensors", remedy=f"its arrays are: {listed}")
+        return found.values, "tensor", found.where
+    two = [usable[key.strip()] for key in array.split(",") if key.strip() in usable]
+    if len(two) == array.count(",") + 1 == 2:
+        if {a.kind for a in two} != {"direction"} or two[0].where != two[1].where:
+            raise InputError(
+                f"the arrays {array!r} of {name!r} are no vectors on the same places", remedy=f"its arrays are: {listed}"
+            )
+        both = [np.pad(a.values, ((0, 0), (0, 3 - a.values.shape[1]))) for a in two]
+        return np.stack(both, axis=1), "directions", two[0].where
+    raise InputError(f"{name!r} has no array {array!r}", remedy=f"its arrays are: {listed}")
+
+
+def _only(name: str, what: str, found: list[str], listed: str) -> str:
+    if len(found) != 1:
+        raise InputError(f"{name!r} has {len(found) or 'no'} arrays of {what}", remedy=f"name one of its arrays: {listed}")
+    return found[0]

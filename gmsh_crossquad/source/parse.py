@@ -3,7 +3,7 @@
     smooth                              the default; smooth:0.02 with the core size epsilon
     singularities:(-0.4,0):1,(0.4,0):1  points (2 or 3 coordinates) and their indices in quarter turns
     eigenmode:4                         4th eigenfunction; eigenmode:4:neumann, eigenmode:4:isolines
-    stress.vtu:principal                a file (.vtu, .vtk, .msh) and its array or view
+    stress.vtu:principal                a file (.vtu, .vtk, .msh) and its array (see `files`) or view
     view:2                              a Gmsh view of the session
     module:function                     a Python function
     1=eigenmode:4; 2=smooth             by surface; a part without number is for all others
@@ -13,6 +13,8 @@
 
 from __future__ import annotations
 
+import operator
+import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -134,7 +136,7 @@ def parse_field(
 
     Parameters
     ----------
-    value : str, callable, FieldSource, or mapping of surface tag (None: all others) to these
+    value : str, path, callable, FieldSource, or mapping of surface tag (None: all others) to these
     load_view : callable
         Makes a source of the tag of a Gmsh view.
     load_views : callable
@@ -148,6 +150,8 @@ def parse_field(
     from .per_face import PerFace
     from .smooth import Smooth
 
+    if isinstance(value, os.PathLike):
+        value = os.fspath(value)
     if isinstance(value, str):
         parts: dict[int | None, FieldSource] = {t: _made(f, load_view, load_views) for t, f in parse_text(value).items()}
     elif isinstance(value, Mapping):
@@ -168,8 +172,8 @@ def parse_field(
 def _tag(value: Any) -> int | None:
     """Surface tag of a key."""
     try:
-        return None if value is None else int(value)
-    except (TypeError, ValueError):
+        return None if value is None else operator.index(value)
+    except TypeError:
         raise InputError(f"a field is given for surface {value!r}", remedy="give the tag of a surface") from None
 
 

@@ -18,7 +18,7 @@ _SHAPES = {
     "direction": "(n, 2) or (n, 3)",
     "directions": "(n, 2, 2) or (n, 2, 3)",
     "angle": "(n,)",
-    "tensor": "(n, 3), (n, 6), (n, 9), (n, 2, 2) or (n, 3, 3)",
+    "tensor": "(n, 3), (n, 4), (n, 6), (n, 9), (n, 2, 2) or (n, 3, 3)",
 }
 
 
@@ -29,7 +29,7 @@ def checked_values(values: object, kind: str, count: int) -> Float:
     ----------
     values : array_like
         One direction (n, 2|3); two (n, 2, 2|3), (n, 4) or (n, 6); angles (n,) or (n, 1); tensors (n, 3) as xx, yy, xy,
-        (n, 6) as xx, yy, zz, xy, yz, xz, (n, 9) or (n, 3, 3) by rows, (n, 2, 2).
+        (n, 6) as xx, yy, zz, xy, yz, xz, (n, 4), (n, 9), (n, 2, 2) or (n, 3, 3) by rows.
     kind : {"direction", "directions", "angle", "tensor"}
     count : int
         Wanted n.
@@ -83,9 +83,10 @@ def _angle(v: Float) -> Float | None:
 
 def _tensor(v: Float) -> Float | None:
     n = len(v)
-    if v.ndim == 2 and v.shape[1] == 9:
-        out = v.reshape(n, 3, 3)
-    elif v.ndim == 3 and v.shape[1:] in ((2, 2), (3, 3)):
+    if v.ndim == 2 and v.shape[1] in (4, 9):
+        side = 2 if v.shape[1] == 4 else 3
+        v = v.reshape(n, side, side)
+    if v.ndim == 3 and v.shape[1:] in ((2, 2), (3, 3)):
         out = np.zeros((n, 3, 3))
         out[:, : v.shape[1], : v.shape[1]] = v
     elif v.ndim == 2 and v.shape[1] in (3, 6):
