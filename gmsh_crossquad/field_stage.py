@@ -221,6 +221,10 @@ def _changes(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) ->
         notes.append(f"the index of {_name(model, mesh, v)} was changed from {old} to {new}")
     for v in aligned.added:
         notes.append(f"a singularity of {quarter_text(int(aligned.index[v]))} was added at {_name(model, mesh, v)}")
+    for v in dict.fromkeys(v for v, _ in aligned.split):
+        parts = sum(w == v for w, _ in aligned.split)
+        what = f"the singularity of {quarter_text(parts)} at {_name(model, mesh, v)} was split into {parts} of +1/4"
+        notes.append(f"{what}: fewer than three blocks around a point cannot be convex")
     if aligned.moved:
         start, end = (mesh.points[list(rows)] for rows in zip(*aligned.moved))
         far = model.scale * float(np.linalg.norm(end - start, axis=1).max())

@@ -239,8 +239,10 @@ class AlignedField:
         has jumps of quarter turns, which carry indices to holes and vertices; phi has none (unless singularities were moved).
     added : tuple of int
         Singular vertices that the given field did not have, so that the indices fit.
+    split : tuple of (int, int)
+        Singular vertices whose index of 1/2 or more was shared, and where a quarter of it is now.
     moved : tuple of (int, int)
-        Where singularities of the given field were and are now.
+        Where singularities were before and are after the flux was made to vanish.
     """
 
     field: CrossField
@@ -252,6 +254,7 @@ class AlignedField:
     phi: Float
     psi: Float
     added: tuple[int, ...] = ()
+    split: tuple[tuple[int, int], ...] = ()
     moved: tuple[tuple[int, int], ...] = ()
 
 
@@ -323,6 +326,8 @@ class TMesh:
         Every boundary loop of every face (after cutting along embedded curves).
     euler : (f,) int64
         Euler characteristic of every face, not cut.
+    pinned : (n,) bool
+        Nodes that keep their place because the user set it (CAD vertices do so anyway); none where it is left out.
     """
 
     position: Float
@@ -341,6 +346,11 @@ class TMesh:
     patch_face: Int
     loops: tuple[tuple[int, tuple[int, ...]], ...]
     euler: Int
+    pinned: Bool = field(default_factory=lambda: np.zeros(0, bool))
+
+    def __post_init__(self) -> None:
+        if not len(self.pinned):
+            object.__setattr__(self, "pinned", np.zeros(len(self.position), bool))
 
 
 @dataclass(frozen=True)

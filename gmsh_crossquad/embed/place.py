@@ -90,6 +90,7 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
             s = _spread(np.concatenate([[0.0], arclength[chain[1:-1]], [model.curves[c].length]]))
         arclength[chain[1:-1]] = s[1:-1]
         points[chain[1:-1]] = model.curves[c].at(s[1:-1])
+    fixed[q.vertex[np.flatnonzero(tmesh.pinned)]] = True
     points[fixed & (cad_vertex >= 0)] = model.vertices[cad_vertex[cad_vertex >= 0]]
 
     quad_size = np.empty((len(q.quads), 2))

@@ -18,6 +18,7 @@ from .operators import FieldOperators
 from .relax import leave_corners, relax_singularities
 from .singularities import QUARTER, singular_vertices, snap_to_vertices
 from .smooth import smooth_field, wrap
+from .strong import split_strong
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["aligned_field"]
@@ -109,14 +110,16 @@ def _given(
             clearance = Clearance(surface, [])
             rotation, new = add_singularities(surface, clearance, rotation, misfit)
             added += new
+    rotation, split = split_strong(surface, Clearance(surface, []), rotation, mesh.port)
     start = CrossField(field.theta, rotation)
     if relax:
-        return _relaxed(Aligner(surface, operators, wanted), mesh, start, field, tuple(added))
-    aligned = align(surface, operators, start, wanted, field if keep else None)
-    return replace(aligned, given=field, added=tuple(added))
+        aligned = _relaxed(Aligner(surface, operators, wanted), mesh, start, field)
+    else:
+        aligned = replace(align(surface, operators, start, wanted, field if keep else None), given=field)
+    return replace(aligned, added=tuple(added), split=split)
 
 
-def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossField, added: tuple[int, ...]) -> AlignedField:
+def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossField) -> AlignedField:
     """The harmonic field without flux around holes, with singularities near those of `start`."""
     clearance = Clearance(aligner.mesh, [aligner.loops[i].vertices for i in aligner.holes])
     moved = vanish_flux(aligner, clearance, aligner.rotate(start).field, [], mesh.port)
@@ -125,7 +128,7 @@ def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossFi
     x = wrap(aligned.field.theta - given.theta)
     turn = aligned.field.rotation - given.rotation - aligner.operators.difference(x)
     psi = aligner.operators.solve(np.zeros(len(x)), QUARTER * np.rint(turn / QUARTER))
-    return replace(aligned, given=given, phi=x - psi, psi=psi, added=added, moved=steps)
+    return replace(aligned, given=given, phi=x - psi, psi=psi, moved=steps)
 
 
 def _interior(surface: SurfaceMesh, rotation: Float) -> Int:

@@ -62,6 +62,7 @@ def glue(model: Model, meshes: Sequence[FaceMesh], tmeshes: Sequence[FaceTMesh])
     on_curve: list[list[tuple[float, int]]] = [[] for _ in model.curves]
     node_curve: dict[int, tuple[int, float]] = {}
     critical: set[int] = set(range(n_cad))
+    pinned: list[int] = []
     quads_at: dict[tuple[int, int], int] = {}
     node_maps: list[Int] = []
 
@@ -85,6 +86,8 @@ def glue(model: Model, meshes: Sequence[FaceMesh], tmeshes: Sequence[FaceTMesh])
                 on_curve[c].append((s, int(to_global[node])))
                 node_curve[int(to_global[node])] = (c, s)
             if v >= 0:
+                if mesh.seed[v] >= 0:
+                    pinned.append(int(to_global[node]))
                 critical.add(int(to_global[node]))
                 quads_at[f, int(to_global[node])] = (2 if boundary_vertex[v] else 4) - int(tmesh.index[node])
         for v in np.flatnonzero(mesh.vertex >= 0).tolist():
@@ -110,6 +113,8 @@ def glue(model: Model, meshes: Sequence[FaceMesh], tmeshes: Sequence[FaceTMesh])
     curve_arclength = np.zeros(n)
     for node, (c, s) in node_curve.items():
         curve[node], curve_arclength[node] = c, s
+    is_pinned = np.zeros(n, bool)
+    is_pinned[pinned] = True
     is_critical = np.zeros(n, bool)
     is_critical[list(critical)] = True
     return TMesh(
@@ -118,6 +123,7 @@ def glue(model: Model, meshes: Sequence[FaceMesh], tmeshes: Sequence[FaceTMesh])
         curve=curve,
         curve_arclength=curve_arclength,
         critical=is_critical,
+        pinned=is_pinned,
         quads_at=quads_at,
         arcs=np.array(arcs.ends, np.int64).reshape(-1, 2),
         length=np.array(arcs.length),
