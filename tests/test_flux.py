@@ -18,7 +18,7 @@ def ready(mesh, wanted, vertices, index):
     arms = z[mesh.triangle_edges][..., None] - a
     rotation = np.angle(np.roll(arms, -1, axis=1) / arms) @ (0.25 * np.array(index, float))
     theta = np.angle(z[:, None] - a) @ (0.25 * np.array(index, float)) - edge_angle(mesh)
-    field, _ = aligner.rotate(CrossField(theta, rotation))
+    field = aligner.rotate(CrossField(theta, rotation)).field
     return aligner, field, Clearance(mesh, [aligner.loops[i].vertices for i in aligner.holes])
 
 
@@ -81,7 +81,7 @@ def test_flux_of_an_annulus_vanishes(index):
     assert sorted(moved.start) == sorted(vertices)
     before, after = (dict(zip(*(a.tolist() for a in singular_vertices(mesh, f.rotation)))) for f in (field, moved.field))
     assert [before[v] for v in moved.start.tolist()] == [after[v] for v in moved.end.tolist()]
-    aligner.finish(*aligner.rotate(moved.field))
+    aligner.finish(aligner.rotate(moved.field), moved.field)
 
 
 def test_singularities_that_pass_each_other_keep_apart():

@@ -28,7 +28,7 @@ from .forces import gradient
 from .singularities import QUARTER, move_index, singular_vertices, walk
 from .surface_mesh import SurfaceMesh
 
-__all__ = ["Moved", "flux_slope", "vanish_flux"]
+__all__ = ["Moved", "excess", "flux_slope", "vanish_flux"]
 
 _ROUNDS = 60
 _PATIENCE = 12
@@ -131,7 +131,7 @@ def vanish_flux(
                 state.flux = flux + QUARTER * energy @ closest(energy @ inverse @ energy, -energy @ inverse @ flux / QUARTER)
             target = remaining * state.flux
         missing = target - state.flux
-        size = _excess(energy, missing)
+        size = excess(energy, missing)
         best, least, waiting = (state, size, 0) if size < least else (best, least, waiting + 1)
         if size < small or waiting == _PATIENCE:
             break
@@ -146,14 +146,14 @@ def vanish_flux(
         slope = _slopes(aligner, best.vertices, index, moving)
         goal = _combination(mesh, energy, target - best.flux, slope, best.vertices, moving, avoid)
         state = _moved(aligner, best, index, mesh.points[goal], avoid, slope)
-        size = _excess(energy, target - state.flux)
+        size = excess(energy, target - state.flux)
         if size >= least:
             break
         best, least = state, size
     return Moved(best.field, aligner.flux(best.field.rotation)[aligner.holes], vertices, best.vertices)
 
 
-def _excess(energy: Float, flux: Float) -> float:
+def excess(energy: Float, flux: Float) -> float:
     """Twice the energy by which a field with this flux (holes,) exceeds the one without."""
     return float(flux @ np.linalg.solve(energy, flux))
 
@@ -175,7 +175,7 @@ def _combination(mesh: SurfaceMesh, energy: Float, missing: Float, slope: Float,
             for v in free:
                 trial = goal.copy()
                 trial[k] = v
-                sizes.append(_excess(energy, missing - slope @ (mesh.points[trial] - mesh.points[vertices]).ravel()))
+                sizes.append(excess(energy, missing - slope @ (mesh.points[trial] - mesh.points[vertices]).ravel()))
             if free:
                 goal[k] = free[int(np.argmin(sizes))]
     return goal
@@ -200,7 +200,7 @@ def _moved(aligner: Aligner, state: _State, index: Int, goal: Float, avoid: Bool
         barred[vertices[k]] = avoid[vertices[k]]
         vertices[k] = path[-1]
         barred[vertices[k]] = True
-    field = aligner.rotate(replace(state.field, rotation=rotation))[0]
+    field = aligner.rotate(replace(state.field, rotation=rotation)).field
     flux = aligner.flux(field.rotation)[aligner.holes]
     predicted = state.flux + slope @ (mesh.points[vertices] - mesh.points[state.vertices]).ravel()
     energy = aligner.harmonic()[1]
