@@ -148,8 +148,6 @@ def test_per_face():
         ("eigenmode:2:robin", "is none"),
         ("eigenmode:2:neumann:dirichlet", "is none"),
         ("view", "has no tag"),
-        ("view:x", "has no tag"),
-        ("view:-1", "has no tag"),
         ("stress.csv", "is none"),
         ("module:", "is none"),
         ("module:f()", "is none"),

@@ -31,12 +31,13 @@ NODES = {2: 3, 3: 4, 9: 6, 16: 8, 10: 9}
 SAME_BOX = 1e-6  # of the box
 
 
-def view_samples(tag: int) -> Samples:
+def view_samples(view: int | str) -> Samples:
     """The values of a view of the current Gmsh session.
 
     Parameters
     ----------
-    tag : int
+    view : int or str
+        Its tag or its name.
 
     Raises
     ------
@@ -45,9 +46,13 @@ def view_samples(tag: int) -> Samples:
     FieldError
         If its values are none that can be used.
     """
-    if tag not in gmsh.view.getTags():
-        have = ", ".join(str(t) for t in gmsh.view.getTags()) or "none"
-        raise InputError(f"there is no view {tag}", remedy=f"the views are: {have}")
+    names = {int(t): gmsh.view.option.getString(int(t), "Name") for t in gmsh.view.getTags()}
+    found = [t for t, name in names.items() if view in (t, name)]
+    if len(found) != 1:
+        have = ", ".join(f"{t} ({name})" for t, name in names.items()) or "none"
+        what = f"there is no view {view}" if not found else f"there are {len(found)} views {view!r}"
+        raise InputError(what, remedy=f"the views are: {have}")
+    tag = found[0]
     step = int(gmsh.view.option.getNumber(tag, "TimeStep"))
     lists = _lists(tag)
     return _from_lists(tag, step, lists) if lists is not None else _from_model(tag, step)

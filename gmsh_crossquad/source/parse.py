@@ -4,7 +4,7 @@
     singularities:(-0.4,0):1,(0.4,0):1  points (2 or 3 coordinates) and their indices in quarter turns
     eigenmode:4                         4th eigenfunction; eigenmode:4:neumann, eigenmode:4:isolines
     stress.vtu:principal                a file (.vtu, .vtk, .msh) and its array (see `files`) or view
-    view:2                              a Gmsh view of the session
+    view:2                              a Gmsh view of the session, by tag or by name
     module:function                     a Python function
     1=eigenmode:4; 2=smooth             by surface; a part without number is for all others
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["FieldText", "parse_field", "parse_text"]
 
 FORMS = (
-    "write smooth, singularities:(x,y):q,..., eigenmode:k, file.vtu:array, file.msh:view, view:tag or module:function, "
+    "write smooth, singularities:(x,y):q,..., eigenmode:k, file.vtu:array, file.msh:view, view:name or module:function, "
     "or 1=...;2=... by surface"
 )
 FILES = (".vtu", ".vtk", ".msh")
@@ -124,13 +124,14 @@ def _eigenmode(rest: str, text: str) -> FieldText:
 
 
 def _view(rest: str, text: str) -> FieldText:
-    if not rest.strip().isdecimal():
-        raise InputError(f"the view {text!r} has no tag", remedy="write view:2")
-    return FieldText("view", (int(rest),))
+    name = rest.strip()
+    if not name:
+        raise InputError(f"the view {text!r} has no tag", remedy="write view:2, or view:name")
+    return FieldText("view", (int(name) if name.isdecimal() else name,))
 
 
 def parse_field(
-    value: Any, load_view: Callable[[int], FieldSource], load_views: Callable[[str, str | None], FieldSource]
+    value: Any, load_view: Callable[[int | str], FieldSource], load_views: Callable[[str, str | None], FieldSource]
 ) -> FieldSource:
     """The source that a user gave as a text or an object.
 
@@ -138,7 +139,7 @@ def parse_field(
     ----------
     value : str, path, callable, FieldSource, or mapping of surface tag (None: all others) to these
     load_view : callable
-        Makes a source of the tag of a Gmsh view.
+        Makes a source of the tag or the name of a Gmsh view.
     load_views : callable
         Makes a source of a Gmsh mesh file and the name of one of its views, or None.
 
@@ -178,7 +179,7 @@ def _tag(value: Any) -> int | None:
 
 
 def _made(
-    text: FieldText, load_view: Callable[[int], FieldSource], load_views: Callable[[str, str | None], FieldSource]
+    text: FieldText, load_view: Callable[[int | str], FieldSource], load_views: Callable[[str, str | None], FieldSource]
 ) -> FieldSource:
     """The source of a parsed text."""
     if text.kind == "smooth":
