@@ -83,6 +83,30 @@ def _on_block_boundary(mesh: QuadMesh, twin: Int, curve: Int) -> Bool:
     return out
 
 
+def _cut_rings(mesh: QuadMesh, boundary: Bool, twin: Int, ahead: Int, straight: Int) -> None:
+    """Mark a line across every block without corners: a ring is one block that is its own neighbour there.
+
+    The line starts at the CAD vertex with the lowest node, else at the lowest node, of the ring's boundary.
+    """
+    block = np.repeat(mesh.quad_block, 4)
+    cornered = np.bincount(block, boundary & boundary[ahead], minlength=int(block.max(initial=-1)) + 1) > 0
+    node = mesh.quads.ravel()
+    on_boundary = np.zeros(len(mesh.points), bool)
+    on_boundary[node[boundary]] = True
+    cad = np.zeros(len(mesh.points), bool)
+    cad[mesh.vertex_node[mesh.vertex_node >= 0]] = True
+    for ring in np.flatnonzero(~cornered & (np.bincount(block, minlength=len(cornered)) > 0)).tolist():
+        across = np.flatnonzero((block == ring) & ~boundary & on_boundary[node])
+        if not len(across):
+            continue
+        h = int(across[np.lexsort((node[across], ~cad[node[across]]))[0]])
+        while not boundary[h]:
+            boundary[h] = boundary[twin[h]] = True
+            if boundary[ahead[h]]:
+                break
+            h = int(straight[h])
+
+
 def build_layout(mesh: QuadMesh, model: Model) -> Layout:
     """The block layout of a mesh.
 
@@ -107,6 +131,7 @@ def build_layout(mesh: QuadMesh, model: Model) -> Layout:
     ahead = h - h % 4 + (h + 1) % 4
     beside = twin[ahead]
     straight = beside - beside % 4 + (beside + 1) % 4
+    _cut_rings(mesh, boundary, twin, ahead, straight)
     turns = boundary[ahead]
     following = np.where(turns, ahead, straight)
     corner = np.zeros(len(h), bool)  # half-edges that start a side

@@ -41,7 +41,7 @@ def test_every_example_is_here():
 def test_example(name, tmp_path, capfd):
     model, mesh = str(GEO / f"{name}.geo"), str(tmp_path / "a.msh")
     size = [] if SIZES[name] is None else ["--size", str(SIZES[name])]
-    assert cli.main(["mesh", model, "-o", mesh, *size]) == 0, capfd.readouterr().err
+    assert cli.main(["mesh", model, "-o", mesh, "--vtu", str(tmp_path / "a.vtu"), *size]) == 0, capfd.readouterr().err
     capfd.readouterr()
     status = cli.main(["check", mesh, "--model", model])
     out = capfd.readouterr().out

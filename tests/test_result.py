@@ -6,6 +6,8 @@ import pytest
 from gmsh_crossquad.block_layout import build_layout
 from gmsh_crossquad.errors import MeshError
 from gmsh_crossquad.quality import measure_quality, twins
+from gmsh_crossquad.records import QuadMesh
+from tests.models import annulus
 from tests.results import NX, NY, hand_made, two_squares_mesh
 
 UP = np.array([[0.0, 0.0, 1.0]] * 2)
@@ -130,3 +132,32 @@ def test_singularities_and_field_are_in_user_coordinates():
         np.testing.assert_allclose(np.abs(field.directions), np.tile([1.0, 0.0, 0.0], (8, 1)), atol=1e-12)
         low, high = field.places.min(axis=0), field.places.max(axis=0)
         np.testing.assert_allclose(high - low, [1.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_a_ring_is_one_block_that_is_cut_once():
+    # 12 x 3 quads around a hole; one CAD vertex on either circle, not opposite of each other
+    model = annulus()
+    n, rows = 12, 3
+    r, a = np.meshgrid(np.linspace(0.4, 1.0, rows + 1), 2 * np.pi * np.arange(n) / n, indexing="ij")
+    node = np.arange(n * (rows + 1)).reshape(rows + 1, n)
+    after = np.roll(node, -1, axis=1)
+    quads = np.stack([node[:-1], node[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
+    circle = [np.append(node[k], node[k, 0]) for k in (rows, 0)]
+    mesh = QuadMesh(
+        points=np.stack([r * np.cos(a), r * np.sin(a), 0 * r], axis=-1).reshape(-1, 3),
+        quads=quads,
+        quad_face=np.zeros(len(quads), np.int64),
+        quad_block=np.zeros(len(quads), np.int64),
+        vertex_node=np.array([c[0] for c in circle]),
+        curve_nodes=tuple(circle),
+        curve_parameters=tuple(np.linspace(0, 1, n + 1) for _ in circle),
+        face_nodes=(node[1:-1].ravel(),),
+    )
+    layout = build_layout(mesh, model)
+    (block,) = layout.blocks
+    assert sorted(block.divisions) == [rows, n]
+    assert len(layout.edges) == 3
+    (cut,) = [i for i, e in enumerate(layout.edges) if e.curve is None]
+    assert sorted(sign for edge, sign in block.sides if edge == cut) == [-1, 1]
+    assert layout.edges[cut].divisions == rows
+    assert {int(layout.edges[cut].nodes[0]), int(layout.edges[cut].nodes[-1])} & set(mesh.vertex_node.tolist())
