@@ -288,12 +288,13 @@ def readme_commands():
 
 
 def test_readme_names_the_commands_that_the_checks_run():
-    install, test, check = readme_commands()
+    install, test, check, *fields = readme_commands()
     script = [line.strip() for line in (ROOT / ".ci" / "run").read_text().splitlines()]
     assert install.split(" && ")[-1] in script
     assert test.split(" && ")[-1] in script
     assert test.split(" && ")[-2].replace("pip install", "pip install --quiet") in script
     assert check in script
+    assert len(fields) == 3 and all(line in script for line in fields)
     assert install.split(" && ")[-1].startswith("gmsh-crossquad mesh ")
 
 
@@ -303,6 +304,15 @@ def test_readme_python_runs(tmp_path):
     (tmp_path / "geo").symlink_to(ROOT / "geo")
     subprocess.run([sys.executable, "-c", code[1]], check=True, cwd=tmp_path, capture_output=True)
     assert names(tmp_path) == ["geo", "plate.msh", "plate.png", "plate.vtu"]
+
+
+def test_readme_parameters_of_a_model(square):
+    block = re.search(r"```c\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    assert block is not None
+    (square / "own.geo").write_text(block[1].replace("eigenmode:4", "smooth") + SQUARE + GROUPS)
+    assert cli.main(["mesh", "own.geo", "-o", "a.msh", "--quiet"]) == 0
+    quads = meshio.read(square / "a.msh").cells_dict["quad"]
+    assert len(quads) == 400  # 20 x 20 of size 0.05, where the points ask for 0.25
 
 
 def test_readme_lists_every_option():
