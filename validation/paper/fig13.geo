@@ -1,4 +1,5 @@
-// NACA 0012 with a sharp trailing edge in a box; the trailing edge has four quads, so its index is -1/2.  The points follow the thickness formula, spaced like a cosine.
+// NACA 0012 with a sharp trailing edge in a box.  Four quads meet at the trailing edge, so its index is -1/2.
+// The points follow the thickness formula, spaced like a cosine.
 n = 40;
 t = 0.12;
 h = 0.08;
