@@ -57,6 +57,12 @@ class FieldResult:
 
             write_field_views(self.faces, path)
 
+    def show(self) -> dict[str, int]:
+        """Add the field as views to the current Gmsh session; see `gmsh_crossquad.cad.field_views.add_field_views`."""
+        from .cad.field_views import add_field_views
+
+        return add_field_views(self.faces)
+
     def picture(self, path: str | PathLike[str]) -> None:
         """Draw the given and the aligned field into a PNG file; see `gmsh_crossquad.view.picture`."""
         from .view.picture import field_picture

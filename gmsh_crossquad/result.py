@@ -86,6 +86,12 @@ class MeshResult:
 
         write_vtu(self, path)
 
+    def write_field(self, path: str | PathLike[str]) -> None:
+        """Write the cross field with all its parts, ``.vtu`` or ``.msh``; see `FieldResult.write`."""
+        from .field_result import FieldResult
+
+        FieldResult(self.field).write(path)
+
     def picture(self, path: str | PathLike[str]) -> None:
         """Draw field, layout and mesh into a PNG file; see `gmsh_crossquad.view.picture`."""
         from .view.picture import picture

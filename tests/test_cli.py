@@ -303,7 +303,7 @@ def test_readme_python_runs(tmp_path):
     assert code is not None
     (tmp_path / "geo").symlink_to(ROOT / "geo")
     subprocess.run([sys.executable, "-c", code[1]], check=True, cwd=tmp_path, capture_output=True)
-    assert names(tmp_path) == ["geo", "plate.msh", "plate.png", "plate.vtu"]
+    assert names(tmp_path) == ["field.vtu", "geo", "plate.msh", "plate.png", "plate.vtu"]
 
 
 def test_readme_parameters_of_a_model(square):

@@ -89,6 +89,18 @@ def test_a_mesh_of_a_result_has_its_singularities(given):
     assert result.quality.conforming and result.quality.inverted == 0
 
 
+def test_the_field_of_a_mesh_is_written_and_shown(given, tmp_path):
+    result = cq.mesh(size=0.2)
+    result.write_field(tmp_path / "f.vtu")
+    (again,) = cq.cross_field(field=str(tmp_path / "f.vtu")).faces
+    assert crosses_differ(result.field[0], again) < 1e-10
+    views = given.show()
+    assert set(views) == {"v", "v across", "u", "singularities"}
+    assert set(views.values()) <= set(gmsh.view.getTags().tolist())
+    shown = cq.cross_field(field=f"view:{views['v']}")
+    assert sum(s.index for s in shown.singularities) == sum(s.index for s in given.singularities)
+
+
 def test_vtu_arrays(given, tmp_path):
     given.write(tmp_path / "f.vtu")
     mesh = meshio.read(tmp_path / "f.vtu")
