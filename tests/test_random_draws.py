@@ -1,0 +1,49 @@
+"""Properties of the whole pipeline on random domains, boundary indices and singularities."""
+
+import gmsh
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from validation.domains import FAMILIES, draw
+from validation.random_draws import outcome
+
+
+@pytest.fixture(scope="module", autouse=True)
+def session():
+    gmsh.initialize(interruptible=False, readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield
+    gmsh.finalize()
+
+
+@given(st.integers(0, 100_000))
+@settings(max_examples=10, deadline=None, derandomize=True)
+def test_draws_are_what_they_should_be(seed):
+    case, again = draw(seed), draw(seed)
+    assert case.geo == again.geo
+    assert case.family == FAMILIES[seed % 10]
+    assert np.array_equal(case.positions, again.positions)
+    assert set(case.quarters) <= {-2, -1, 1, 2}
+    border = np.concatenate([piece.points for loop in case.loops for piece in loop])
+    extent = max(np.ptp(border.real), np.ptp(border.imag))
+    z = case.positions @ np.array([1, 1j])
+    for k in range(len(z)):
+        assert np.abs(np.append(border, np.delete(z, k)) - z[k]).min() > 0.09 * extent
+
+
+@given(st.integers(0, 1_000))
+@settings(max_examples=4, deadline=None, derandomize=True)
+def test_a_random_draw_is_aligned_as_asked_and_meshed(seed):
+    found = outcome(seed)
+    assert found.aligned
+    assert found.quality > 0 or (found.error and "\n" not in found.error)
+
+
+@pytest.mark.parametrize("seed", [45, 104])
+def test_rings_whose_field_has_no_layout_are_meshed(seed):
+    found = outcome(seed)
+    assert found.aligned
+    assert found.quality > 0.1
+    assert any("no divisions" in note for note in found.notes)
