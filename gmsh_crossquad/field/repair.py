@@ -7,7 +7,8 @@ An aligned field with flux around holes need not allow a layout.  In this order,
 
 Measured on 400 random faces with random boundary indices and singularities: 34 had no layout, all of them with holes; either way
 alone gave all of these one (30 with one pair, 3 with two, 1 with three; 13 half way, 8 three quarters, 13 all of the way).  The
-meshes with pairs were better: their least scaled Jacobian had a median of .72 against .64, that of the other faces .71.
+meshes with pairs were better: their least scaled Jacobian had a median of .72 against .64, that of the other faces .71 (in the
+mesh the singularities were free to move).
 """
 
 from __future__ import annotations
