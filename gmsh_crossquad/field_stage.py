@@ -27,9 +27,9 @@ from .source.formula import Singularities
 from .source.per_face import PerFace
 from .source.smooth import Smooth
 
-__all__ = ["Rule", "Wishes", "edge_frames", "field_of_face", "located", "wishes"]
+__all__ = ["Rule", "Wishes", "changes_of", "edge_frames", "field_of_face", "located", "wishes"]
 
-Rule = Literal["keep", "harmonic", "relaxed"]
+Rule = Literal["keep", "harmonic", "relaxed", "divisible"]
 
 MOST_LISTED = 12
 
@@ -147,7 +147,7 @@ def field_of_face(model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "ke
         )
     except Incompatible as error:
         raise _named(model, mesh, error.misfit) from None
-    return aligned, _changes(model, mesh, index, aligned)
+    return aligned, changes_of(model, mesh, index, aligned)
 
 
 def _boundary(model: Model, mesh: FaceMesh, wanted: Wishes) -> tuple[Int, Bool]:
@@ -212,7 +212,7 @@ def _named(model: Model, mesh: FaceMesh, misfit: Misfit) -> FieldError:
     )
 
 
-def _changes(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) -> list[str]:
+def changes_of(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) -> list[str]:
     """Notes on indices that were changed."""
     on = SurfaceMesh(mesh.points, mesh.triangles).boundary_vertex
     notes = []

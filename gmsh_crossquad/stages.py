@@ -19,10 +19,11 @@ from .cad.read import read_model
 from .cad.sizes import target_sizes
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
-from .field_stage import Rule, Wishes, field_of_face, located, wishes
+from .field_stage import Rule, Wishes, changes_of, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
 from .guide import GuideResult, coarse_divisions, smooth_guide
+from .layout.alone import divisible
 from .layout.arc_sizes import arc_sizes
 from .layout.face_tmesh import trace_face
 from .layout.glue import glue
@@ -51,18 +52,19 @@ class Attempt(NamedTuple):
     blocks: float = 1.0
     capped: bool = True
     rule: Rule = "keep"
+    pinned: bool = True
 
 
 # in the order in which they are tried until the mesh is good
 ATTEMPTS = (Attempt(), Attempt(blocks=0.4), Attempt(capped=False), Attempt(blocks=0.15), Attempt(background=0.7))
 GIVEN_ATTEMPTS = (
     Attempt(),
-    Attempt(rule="harmonic"),
-    Attempt(rule="relaxed"),
-    Attempt(blocks=0.4),
-    Attempt(capped=False),
-    Attempt(background=0.7, rule="harmonic"),
-    Attempt(background=0.7, rule="relaxed"),
+    Attempt(rule="divisible"),
+    Attempt(rule="divisible", pinned=False),
+    Attempt(rule="divisible", blocks=0.4),
+    Attempt(rule="divisible", capped=False),
+    Attempt(rule="divisible", background=0.7),
+    Attempt(rule="divisible", background=0.7, pinned=False),
 )
 
 
@@ -109,6 +111,11 @@ class _Faces:
     tmeshes: tuple[FaceTMesh, ...]
     notes: tuple[str, ...]
 
+    def free(self) -> _Faces:
+        """The same without places that singularities must keep."""
+        meshes = tuple(replace(mesh, seed=np.full(len(mesh.points), -1, np.int64)) for mesh in self.meshes)
+        return replace(self, meshes=meshes, notes=(*self.notes, "singular points may have moved a little in the mesh"))
+
 
 def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult:
     """Mesh the current Gmsh model; returns records only.
@@ -143,7 +150,7 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
             if key not in faces:
                 finer = replace(options, background=options.background * attempt.background)
                 faces[key] = _faces(model, finer, wanted, attempt.rule, watch, notes)
-            found = faces[key]
+            found = faces[key] if attempt.pinned else faces[key].free()
             tried = replace(options, block_size=options.block_size * attempt.blocks)
             tmesh, coarse, result, mesh = _mesh(model, found, tried, BLOCKS / attempt.blocks, attempt.capped, watch)
         except (LayoutError, MeshError) as error:
@@ -208,8 +215,8 @@ def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:
     if not wanted.given:
         return ATTEMPTS
     if options.relax:
-        return tuple(a._replace(rule="relaxed") for a in ATTEMPTS)
-    return tuple(a for a in GIVEN_ATTEMPTS if a.rule != "relaxed" or options.relax is None)
+        return (*(a._replace(rule="relaxed") for a in ATTEMPTS), Attempt(rule="divisible"))
+    return tuple(a for a in GIVEN_ATTEMPTS if a.pinned or options.relax is None)
 
 
 def face_fields(options: MeshOptions, watch: Watch | None = None) -> tuple[Model, list[FaceMesh], list[AlignedField], list[str]]:
@@ -244,9 +251,15 @@ def _faces(model: Model, options: MeshOptions, wanted: Wishes, rule: Rule, watch
 
     def work(mesh: FaceMesh) -> tuple[FaceMesh, AlignedField, FaceTMesh, list[str]]:
         with watch.stage("field"):
-            aligned, changes = field_of_face(model, mesh, wanted, rule)
+            aligned, changes = field_of_face(model, mesh, wanted, "harmonic" if rule == "divisible" else rule)
         with watch.stage("trace"):
-            return mesh, aligned, trace_face(mesh, aligned), changes
+            tmesh = trace_face(mesh, aligned)
+        if rule == "divisible":
+            with watch.stage("repair"):
+                other, tmesh = divisible(model, mesh, aligned, tmesh, np.zeros(0, np.int64), move=options.relax is None)
+            changes = list(dict.fromkeys([*changes, *changes_of(model, mesh, aligned.index, other)]))
+            aligned = other
+        return mesh, aligned, tmesh, changes
 
     parts = _on_all_faces(model, options, wanted, watch, notes, work)
     changed = tuple(note for p in parts for note in p[3])
