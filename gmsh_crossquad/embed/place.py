@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..layout.blocks import base_complex
-from ..layout.quotient import Quotient, curve_chain
+from ..layout.quotient import Quotient, arc_points, curve_chain
 from ..records import Bool, Float, Guide, Int, Model, TMesh
 
 __all__ = ["coons", "place"]
@@ -80,6 +80,8 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
         curve[chain[1:-1]] = c
     mine = joinable[(on[joinable] >= 0) & (on[joinable] == curve[q.vertex[joinable]])]
     arclength = _mean(q.vertex[mine], at[mine][:, None], n, arclength[:, None])[:, 0]
+    held = curve >= 0
+    held[q.vertex[joinable[joinable < n_nodes]]] = True
     fixed = cad_vertex >= 0
     for c, chain in enumerate(chains):
         spacing = model.curves[c].spacing
@@ -92,6 +94,7 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
         points[chain[1:-1]] = model.curves[c].at(s[1:-1])
     fixed[q.vertex[np.flatnonzero(tmesh.pinned)]] = True
     points[fixed & (cad_vertex >= 0)] = model.vertices[cad_vertex[cad_vertex >= 0]]
+    points = _carry(tmesh, q, element, points, held)
 
     quad_size = np.empty((len(q.quads), 2))
     row = 0
@@ -117,6 +120,30 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
         quad_size=quad_size,
         chains=chains,
     )
+
+
+def _carry(tmesh: TMesh, q: Quotient, element: Float, points: Float, held: Bool) -> Float:
+    """Let the vertices inside arcs follow the shifts of the nodes and curve vertices (`held`) on and at the ends of their arcs.
+
+    Joined nodes and spread vertices on curves lie elsewhere than the T-mesh has them; along an arc the shift is interpolated
+    linearly between them.  A vertex on several arcs takes the mean.
+    """
+    total, count = np.zeros_like(points), np.zeros(len(points))
+    for arc in np.flatnonzero((q.divisions > 1) & (tmesh.arc_curve < 0)).tolist():
+        rows = np.array(arc_points(tmesh, q.divisions, q.offset, arc))
+        v = q.vertex[rows]
+        known = held[v]
+        known[[0, -1]] = True
+        shift = points[v] - element[rows]
+        t = np.arange(len(rows))
+        at = np.flatnonzero(known)
+        shift = np.stack([np.interp(t, at, shift[at, c]) for c in range(3)], axis=1)
+        free = np.flatnonzero(~known)
+        np.add.at(total, v[free], (element[rows] + shift)[free])
+        np.add.at(count, v[free], 1)
+    some = count > 0
+    points[some] = total[some] / count[some, None]
+    return points
 
 
 def _mean(group: Int, values: Float, n: int, out: Float) -> Float:

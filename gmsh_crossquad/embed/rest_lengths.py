@@ -33,6 +33,8 @@ SWEEPS = 12
 """Jacobi sweeps of the diffusion, and of the limiter."""
 TURN = float(np.radians(40.0))
 """Wanted greatest turning of a curve along one edge."""
+SHORTEST = 1e-4
+"""Present lengths count as at least this part of `quad_size`."""
 LEAST_RATIO = 2.0
 """Rest lengths of neighbours differ by no more than this factor, where they are free."""
 
@@ -59,7 +61,9 @@ class RestLengths:
     vertices: Float
 
 
-def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool = False) -> RestLengths:
+def rest_lengths(
+    guide: Guide, model: Model, table: CurveTable, *, actual: float = 0.0, graded: bool = True
+) -> RestLengths:
     """Make the sizes of a guide grid consistent.
 
     Parameters
@@ -68,9 +72,10 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool 
     model : Model
     table : CurveTable
         Of the model's curves.
-    actual : bool
-        Take the geometric mean of `quad_size` and the present lengths of the edges instead of `quad_size` alone; the guide
-        must have no edge without length.
+    actual : float
+        Weight of the present lengths of the edges in the geometric mean with `quad_size`.
+    graded : bool
+        False leaves out the diffusion.
 
     Returns
     -------
@@ -85,9 +90,10 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool 
     count = np.bincount(edge_rows.ravel(), minlength=len(edges))
     sides = np.log(guide.quad_size[:, [0, 1, 0, 1]])
     own = np.bincount(edge_rows.ravel(), sides.ravel(), minlength=len(edges)) / count
-    if actual:
+    if actual > 0.0:
         vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
-        own = 0.5 * (own + 0.5 * np.log(np.einsum("ec,ec->e", vector, vector)))
+        present = 0.5 * np.log(np.maximum(np.einsum("ec,ec->e", vector, vector), np.finfo(float).tiny))
+        own = (1.0 - actual) * own + actual * np.maximum(present, own + np.log(SHORTEST))
     chain_edges = _chain_edges(guide, model, edges)
     held = np.zeros(len(edges), dtype=bool)
     for row, rows in enumerate(chain_edges):
@@ -102,7 +108,7 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: bool 
             turning = np.diff(table.at(np.full(len(places), row), places)[0][:, 3])
             own[rows[~single]] -= np.log(np.maximum(turning[~single] / TURN, 1.0))
     pairs = _neighbours(guide, chain_edges, edges, edge_rows)
-    length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held))
+    length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held) if graded else own)
     chains = tuple(
         _fill_chain(length[rows], guide, model, row) if len(rows) else np.zeros(0) for row, rows in enumerate(chain_edges)
     )

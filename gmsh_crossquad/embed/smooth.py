@@ -43,6 +43,8 @@ SHARPENING = (12, 6)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
 WANTED = 0.85
 LEAST_AREA = 1e-3
+LEAST_EPS = 1e-4
+STARTS = ("placed", "given", "laplace")
 VALID = 1e-6
 """Scaled Jacobian from which a grid is inside the barrier beyond doubt."""
 GOOD = 0.7
@@ -92,10 +94,12 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     table = CurveTable(model.curves)
     given = spread_chains(guide, model, table)
     rest = rest_lengths(given, model, table)
+    placed = rest_lengths(given, model, table, actual=1.0, graded=False)
     best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), "given", 0
-    for name in ("given", "laplace"):
-        start = given if name == "given" else laplace_start(given, model, table)
-        candidate, used, valid = _untangle(start, model, table, rest)
+    for name in STARTS:
+        start = laplace_start(given, model, table) if name == "laplace" else given
+        own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
+        candidate, used, valid = _untangle(start, model, table, own, sides)
         rounds += used
         score = float(guide_quality(candidate, model).min())
         if score > quality or valid:
@@ -120,15 +124,16 @@ def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
     return replace(guide, points=points, arclength=arclength)
 
 
-def _untangle(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, int, bool]:
+def _untangle(
+    guide: Guide, model: Model, table: CurveTable, rest: RestLengths, sides: Float
+) -> tuple[Guide, int, bool]:
     """Minimise the regularised energy until no corner is turned over: the result, the rounds, and whether it is valid."""
     grid = GridEnergy(guide, model, table, rest)
     z = np.zeros(grid.size)
-    sides = rest.even
     least = float(grid.areas(z, sides).min())
-    rounds = 0
+    rounds, eps = 0, np.inf
     while least <= LEAST_AREA and rounds < ROUNDS and grid.size:
-        eps = max(1e-3, float(np.sqrt(1e-6 + 0.04 * least * least)))
+        eps = max(LEAST_EPS, min(0.5 * eps, float(np.sqrt(1e-6 + 0.04 * least * least))))
         z = minimise(
             partial(grid.value, sides=sides, eps=eps, power=1),
             partial(grid.factor, sides=sides, eps=eps, power=1),
@@ -147,7 +152,7 @@ def _untangle(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) 
 def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
     """Minimise the energy with graded rest lengths, inside the barrier; from a tangled grid with eps > 0 and power 1."""
     if barrier:
-        rest = rest_lengths(guide, model, table, actual=True)
+        rest = rest_lengths(guide, model, table, actual=0.5)
     grid = GridEnergy(guide, model, table, rest)
     if not grid.size:
         return guide

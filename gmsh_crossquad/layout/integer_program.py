@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import highspy
 import numpy as np
 
-from ..records import Float, Int
+from ..records import Bool, Float, Int
 
 __all__ = ["IntegerProgram", "Solution"]
 
@@ -29,6 +29,7 @@ class Solution:
     Attributes
     ----------
     values : (n,) int64
+        Columns that are not integral are rounded.
     cost : float
     bound : float
         Cost of the linear relaxation: no solution is cheaper.
@@ -43,7 +44,7 @@ class Solution:
 
 
 class IntegerProgram:
-    """min cost'x over integer x >= 0 with x <= upper and rows ``lower <= a'x <= upper``.
+    """min cost'x over integer (but for some columns) x >= 0 with x <= upper and rows ``lower <= a'x <= upper``.
 
     Columns and rows can be added between solves; every solve starts from the last basis.
 
@@ -59,6 +60,7 @@ class IntegerProgram:
         self._solver.setOptionValue("threads", 1)
         self._solver.setOptionValue("presolve", "off")
         self._upper = np.zeros(0)
+        self._integral: Bool = np.zeros(0, bool)
         self.add_columns(cost, upper)
 
     @property
@@ -66,12 +68,13 @@ class IntegerProgram:
         """Number of columns."""
         return len(self._upper)
 
-    def add_columns(self, cost: Float, upper: Float) -> int:
-        """Add columns; returns the number of the first."""
+    def add_columns(self, cost: Float, upper: Float, *, integral: bool = True) -> int:
+        """Add columns; returns the number of the first.  Those that are not `integral` may take any value."""
         first, n = self.n_columns, len(cost)
         empty = np.zeros(0, np.int32)
         self._solver.addCols(n, np.asarray(cost, float), np.zeros(n), np.asarray(upper, float), 0, empty, empty, np.zeros(0))
         self._upper = np.concatenate([self._upper, upper])
+        self._integral = np.concatenate([self._integral, np.full(n, integral)])
         return first
 
     def add_rows(self, lower: Float, upper: Float, start: Int, column: Int, value: Float) -> None:
@@ -108,7 +111,7 @@ class IntegerProgram:
         while programs < MAX_PROGRAMS:
             if found is not None:
                 x, cost = found
-                distance = np.abs(x - np.round(x))
+                distance = np.where(self._integral, np.abs(x - np.round(x)), 0.0)
                 if distance.max(initial=0.0) <= FRACTION:
                     answer = Solution(np.round(x).astype(np.int64), cost, bound, programs)
                     break

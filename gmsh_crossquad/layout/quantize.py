@@ -21,6 +21,7 @@ import scipy.sparse as sp
 
 from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
+from .alignment import alignment
 from .cuts import Cut, separation_cuts
 from .integer_program import IntegerProgram
 from .quotient import quotient
@@ -122,6 +123,23 @@ def quantize(
         start, column = on_columns.indptr[:-1].astype(np.int64), on_columns.indices.astype(np.int64)
         program.add_rows(lower - shift, most - shift, start, column, on_columns.data)
 
+    rows, slack, price = alignment(tmesh, target)
+    first = program.add_columns(np.repeat(price, 2), np.full(2 * len(slack), np.inf), integral=False)
+    if len(slack):
+        on_columns = (rows @ expand).tocoo()
+        k = np.arange(len(slack))
+        shift = rows @ floor
+        matrix = sp.csr_array(
+            (
+                np.concatenate([on_columns.data, -np.ones(len(k)), np.ones(len(k))]),
+                (
+                    np.concatenate([on_columns.row, k, k]),
+                    np.concatenate([on_columns.col, first + 2 * k, first + 2 * k + 1]),
+                ),
+            )
+        )
+        start, column = matrix.indptr[:-1].astype(np.int64), matrix.indices.astype(np.int64)
+        program.add_rows(-slack - shift, slack - shift, start, column, matrix.data)
     balance = _balance(tmesh)
     add(balance, np.zeros(balance.shape[0]), np.zeros(balance.shape[0]))
     for bounds, equal in ((exact or {}, True), (at_most or {}, False)):
