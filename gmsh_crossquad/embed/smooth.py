@@ -37,13 +37,15 @@ __all__ = ["SmoothReport", "smooth"]
 
 ROUNDS = 12
 """Greatest number of untangling rounds per start."""
-POLISHING = ((4, 4), (4, 8))
+POLISHING = ((4, 4, 0.5), (4, 8, 1.0))
 """Power and factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
-SHARPENING = (12, 6)
+SHARPENING = (12, 6, 1.0)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
 WANTED = 0.85
 LEAST_AREA = 1e-3
 LEAST_EPS = 1e-4
+FEW_ROUNDS = 4
+DOUBTFUL = 0.05
 STARTS = ("placed", "given", "laplace")
 VALID = 1e-6
 """Scaled Jacobian from which a grid is inside the barrier beyond doubt."""
@@ -95,28 +97,35 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     given = spread_chains(guide, model, table)
     rest = rest_lengths(given, model, table)
     placed = rest_lengths(given, model, table, actual=1.0, graded=False)
-    best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), "given", 0
+    best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), STARTS[0], 0
     for name in STARTS:
         start = laplace_start(given, model, table) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
-        candidate, used, valid = _untangle(start, model, table, own, sides)
+        candidate, used, valid = _untangle(start, model, table, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
         rounds += used
-        score = float(guide_quality(candidate, model).min())
-        if score > quality or valid:
+        candidate, score = _polish_all(candidate, model, table, rest)
+        if min(score, GOOD) > min(quality, GOOD) or (valid and quality <= 0.0):
             best, quality, chosen = candidate, score, name
-        if valid:
+        if quality > (DOUBTFUL if name == "placed" else 0.0):
             break
-    for power, effort in POLISHING:
-        polished = _polish(best, model, table, rest, power, effort, barrier=quality > VALID)
-        score = float(guide_quality(polished, model).min())
-        if min(score, GOOD) >= min(quality, GOOD):
-            best, quality = polished, score
-    if VALID < quality < WANTED:
-        polished = _polish(best, model, table, rest, *SHARPENING, barrier=True)
-        if guide_quality(polished, model).min() > quality:
-            best = polished
     final = guide_quality(best, model)
     return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen)
+
+
+def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, float]:
+    """The most polished grid that is as good as those before it, and its least scaled Jacobian."""
+    quality = float(guide_quality(guide, model).min())
+    for power, effort, actual in POLISHING:
+        polished = _polish(guide, model, table, rest, power, effort, actual, barrier=quality > VALID)
+        score = float(guide_quality(polished, model).min())
+        if min(score, GOOD) >= min(quality, GOOD):
+            guide, quality = polished, score
+    if VALID < quality < WANTED:
+        polished = _polish(guide, model, table, rest, *SHARPENING, barrier=True)
+        score = float(guide_quality(polished, model).min())
+        if score > quality:
+            guide, quality = polished, score
+    return guide, quality
 
 
 def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
@@ -125,14 +134,14 @@ def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
 
 
 def _untangle(
-    guide: Guide, model: Model, table: CurveTable, rest: RestLengths, sides: Float
+    guide: Guide, model: Model, table: CurveTable, rest: RestLengths, sides: Float, most: int
 ) -> tuple[Guide, int, bool]:
     """Minimise the regularised energy until no corner is turned over: the result, the rounds, and whether it is valid."""
     grid = GridEnergy(guide, model, table, rest)
     z = np.zeros(grid.size)
     least = float(grid.areas(z, sides).min())
     rounds, eps = 0, np.inf
-    while least <= LEAST_AREA and rounds < ROUNDS and grid.size:
+    while least <= LEAST_AREA and rounds < most and grid.size:
         eps = max(LEAST_EPS, min(0.5 * eps, float(np.sqrt(1e-6 + 0.04 * least * least))))
         z = minimise(
             partial(grid.value, sides=sides, eps=eps, power=1),
@@ -149,10 +158,10 @@ def _untangle(
     return _moved(guide, grid, z), rounds, least > 0.0
 
 
-def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
+def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, actual: float, barrier: bool) -> Guide:
     """Minimise the energy with graded rest lengths, inside the barrier; from a tangled grid with eps > 0 and power 1."""
     if barrier:
-        rest = rest_lengths(guide, model, table, actual=0.5)
+        rest = rest_lengths(guide, model, table, actual=actual)
     grid = GridEnergy(guide, model, table, rest)
     if not grid.size:
         return guide

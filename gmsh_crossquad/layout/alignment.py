@@ -19,7 +19,8 @@ __all__ = ["alignment"]
 STRIP = 4.0
 PRICE = 0.3
 MOST = 40
-LEAST = 0.5
+LEAST = 1.0
+UNLIKE = 1.5
 
 
 def alignment(tmesh: TMesh, target: Float) -> tuple[sp.csr_array, Float, Float]:
@@ -48,7 +49,8 @@ def alignment(tmesh: TMesh, target: Float) -> tuple[sp.csr_array, Float, Float]:
         length = [float(sum(tmesh.length[arc] for arc, _ in side)) for side in sides]
         for i in (0, 1):
             long, wide = 0.5 * (length[i] + length[i + 2]), 0.5 * (length[i + 1] + length[i - 1])
-            if long < STRIP * wide or len(sides[i]) + len(sides[i + 2]) < 3:
+            unlike = max(length[i], length[i + 2]) > UNLIKE * min(length[i], length[i + 2])
+            if long < STRIP * wide or unlike or len(sides[i]) + len(sides[i + 2]) < 3:
                 continue
             one = [arc for arc, _ in sides[i]]
             two = [arc for arc, _ in sides[i + 2]][::-1]
