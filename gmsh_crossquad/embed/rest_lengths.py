@@ -35,6 +35,8 @@ TURN = float(np.radians(40.0))
 """Wanted greatest turning of a curve along one edge."""
 SHORTEST = 1e-4
 """Present lengths count as at least this part of `quad_size`."""
+FARTHEST = 1.3
+"""The mean with the present length differs from that by no more than this factor."""
 LEAST_RATIO = 2.0
 """Rest lengths of neighbours differ by no more than this factor, where they are free."""
 
@@ -93,7 +95,8 @@ def rest_lengths(
     if actual > 0.0:
         vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
         present = 0.5 * np.log(np.maximum(np.einsum("ec,ec->e", vector, vector), np.finfo(float).tiny))
-        own = (1.0 - actual) * own + actual * np.maximum(present, own + np.log(SHORTEST))
+        present = np.maximum(present, own + np.log(SHORTEST))
+        own = present + np.clip((1.0 - actual) * (own - present), -np.log(FARTHEST), np.log(FARTHEST))
     chain_edges = _chain_edges(guide, model, edges)
     held = np.zeros(len(edges), dtype=bool)
     for row, rows in enumerate(chain_edges):

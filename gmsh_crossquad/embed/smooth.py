@@ -37,9 +37,9 @@ __all__ = ["SmoothReport", "smooth"]
 
 ROUNDS = 12
 """Greatest number of untangling rounds per start."""
-POLISHING = ((4, 4, 0.5), (4, 8, 1.0))
+POLISHING = ((4, 4), (4, 8))
 """Power and factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
-SHARPENING = (12, 6, 1.0)
+SHARPENING = (12, 6)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
 WANTED = 0.85
 LEAST_AREA = 1e-3
@@ -97,14 +97,14 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     given = spread_chains(guide, model, table)
     rest = rest_lengths(given, model, table)
     placed = rest_lengths(given, model, table, actual=1.0, graded=False)
-    best, quality, chosen, rounds = given, float(guide_quality(given, model).min()), STARTS[0], 0
+    best, quality, chosen, rounds = given, -np.inf, STARTS[0], 0
     for name in STARTS:
         start = laplace_start(given, model, table) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
         candidate, used, valid = _untangle(start, model, table, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
         rounds += used
         candidate, score = _polish_all(candidate, model, table, rest)
-        if min(score, GOOD) > min(quality, GOOD) or (valid and quality <= 0.0):
+        if score > quality or (valid and quality <= 0.0):
             best, quality, chosen = candidate, score, name
         if quality > (DOUBTFUL if name == "placed" else 0.0):
             break
@@ -114,18 +114,19 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
 
 def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, float]:
     """The most polished grid that is as good as those before it, and its least scaled Jacobian."""
-    quality = float(guide_quality(guide, model).min())
-    for power, effort, actual in POLISHING:
-        polished = _polish(guide, model, table, rest, power, effort, actual, barrier=quality > VALID)
-        score = float(guide_quality(polished, model).min())
-        if min(score, GOOD) >= min(quality, GOOD):
-            guide, quality = polished, score
+    best, latest = guide, guide
+    quality = now = float(guide_quality(guide, model).min())
+    for power, effort in POLISHING:
+        latest = _polish(latest, model, table, rest, power, effort, barrier=now > VALID)
+        now = float(guide_quality(latest, model).min())
+        if min(now, GOOD) >= min(quality, GOOD):
+            best, quality = latest, now
     if VALID < quality < WANTED:
-        polished = _polish(guide, model, table, rest, *SHARPENING, barrier=True)
+        polished = _polish(best, model, table, rest, *SHARPENING, barrier=True)
         score = float(guide_quality(polished, model).min())
         if score > quality:
-            guide, quality = polished, score
-    return guide, quality
+            best, quality = polished, score
+    return best, quality
 
 
 def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
@@ -158,10 +159,10 @@ def _untangle(
     return _moved(guide, grid, z), rounds, least > 0.0
 
 
-def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, actual: float, barrier: bool) -> Guide:
+def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
     """Minimise the energy with graded rest lengths, inside the barrier; from a tangled grid with eps > 0 and power 1."""
     if barrier:
-        rest = rest_lengths(guide, model, table, actual=actual)
+        rest = rest_lengths(guide, model, table, actual=0.5)
     grid = GridEnergy(guide, model, table, rest)
     if not grid.size:
         return guide

@@ -23,7 +23,10 @@ from .tangents import continuation, end_tangents
 
 __all__ = ["fill", "poor_cells"]
 
-ROUNDS = 6  # of straightening; each halves the bulge and the unevenness
+# rounds of straightening: what each takes off the bulge and the unevenness; all of it where cells are still folded
+SHARES = (0.5,) * 6 + (1.0,) * 4
+BUNDLE = 256  # edges side by side that may have to be straightened together
+BULGE = 0.2  # of a cell's width, up to which an edge beside a straight one may bulge
 KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
 SHOWN = 8  # divisions that show what any greater number would
 POOR = 0.05  # guide quads below this are held to this
@@ -168,24 +171,42 @@ class _Work:
         skeleton.put_cubics(np.flatnonzero(~topology.on_curve), edges, tangents)
         worst = cells.place(np.arange(len(quad_edges)), self.points)
         even = np.zeros(len(edges))
-        for _ in range(ROUNDS):
+        for share in SHARES:
+            bad: Bool = worst <= 0.0 if share == 1.0 else worst < KEEP * np.maximum(own, POOR)
             soft: Bool = np.zeros(len(edges), bool)
-            soft[quad_edges[worst < KEEP * np.maximum(own, POOR)]] = True
+            soft[quad_edges[bad]] = True
             soft &= skeleton.divisions > 1
+            if share == 1.0 and np.any(soft):
+                soft = _with_bundle(soft, quad_edges, *skeleton.bulges(edges))
             if not np.any(soft):
-                break
-            even[soft] += 0.5 * (1.0 - even[soft])
+                continue
+            even[soft] += share * (1.0 - even[soft])
             for row, e in enumerate(topology.chain_edges):
                 if np.any(soft[e]):
                     self.put_curve(row, even)
             e = np.flatnonzero(soft & ~topology.on_curve)
             chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
-            tangents[e] = 0.5 * (tangents[e] + chord[:, None])
+            tangents[e] += share * (chord[:, None] - tangents[e])
             skeleton.put_cubics(e, edges, tangents)
             again = np.flatnonzero(np.any(soft[quad_edges], axis=1))
             worst[again] = cells.place(again, self.points)
         skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)
         return worst
+
+
+def _with_bundle(straight: Bool, quad_edges: Int, bulge: Float, length: Float) -> Bool:
+    """Edges to straighten with those given: opposite ones, cell by cell, that bulge by much of the width between the two."""
+    out = straight.copy()
+    for _ in range(BUNDLE):
+        more = np.zeros(len(out), bool)
+        for k in range(4):
+            here, there = quad_edges[:, k], quad_edges[:, (k + 2) % 4]
+            width = 0.5 * (length[quad_edges[:, (k + 1) % 4]] + length[quad_edges[:, (k + 3) % 4]])
+            more[there[out[here] & (bulge[there] > BULGE * width)]] = True
+        if not np.any(more & ~out):
+            break
+        out |= more
+    return out
 
 
 def _refuse_folds(model: Model, guide: Guide, own: Float, worst: Float) -> None:

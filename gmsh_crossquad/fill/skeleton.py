@@ -83,6 +83,17 @@ class Skeleton:
         """Nodes (divisions - 1, 3) inside edge `e`, from the lower vertex."""
         return self.inside[self.first[e] : self.first[e] + self.divisions[e] - 1]
 
+    def bulges(self, edges: Int) -> tuple[Float, Float]:
+        """Greatest distance (e,) of the nodes inside every edge from its chord, and the chord's length."""
+        chord = self.vertices[edges[:, 1]] - self.vertices[edges[:, 0]]
+        length = np.linalg.norm(chord, axis=1)
+        owner, _ = _ragged(self.divisions - 1)
+        off = self.inside - self.vertices[edges[owner, 0]]
+        along = np.einsum("nc,nc->n", off, chord[owner]) / np.maximum(length[owner] ** 2, np.finfo(float).tiny)
+        bulge = np.zeros(len(edges))
+        np.maximum.at(bulge, owner, np.linalg.norm(off - along[:, None] * chord[owner], axis=1))
+        return bulge, length
+
     def put_chain(self, chain: Int, edges: Int, forward: Bool, nodes: Float) -> None:
         """Put the `nodes` of a whole CAD curve on its guide vertices `chain` and its `edges`."""
         place = np.concatenate([[0], np.cumsum(self.divisions[edges])])
