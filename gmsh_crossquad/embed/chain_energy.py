@@ -46,9 +46,20 @@ class ChainEnergy:
         Row of every guide vertex among the sliding ones (of vertices on a curve that are not fixed).
     slide : int
         Number of sliding vertices.
+    turns : tuple of (k,) float64, optional
+        Turning along every edge from which it costs, where less than `TURN_LIMIT`.
     """
 
-    def __init__(self, guide: Guide, model: Model, rest: tuple[Float, ...], table: CurveTable, row: Int, slide: int) -> None:
+    def __init__(
+        self,
+        guide: Guide,
+        model: Model,
+        rest: tuple[Float, ...],
+        table: CurveTable,
+        row: Int,
+        slide: int,
+        turns: tuple[Float, ...] | None = None,
+    ) -> None:
         self.slide = slide
         place, turning = [np.zeros(0)], [np.zeros(0)]
         ends = [np.zeros((0, 2), dtype=np.int64)]
@@ -81,6 +92,8 @@ class ChainEnergy:
         self._weight = np.where(moves, 1.0, 0.0)
         self._start, self._end = every.T
         self._rest = np.concatenate(lengths)
+        limits = [np.zeros(0)] + [turns[c] for c, chain in enumerate(guide.chains) if len(chain) > 1] if turns else []
+        self._turn_limit = np.minimum(np.concatenate(limits), TURN_LIMIT) if turns else np.full(len(self._rest), TURN_LIMIT)
         corners = [pair for edges_there in ending.values() for pair in combinations(edges_there, 2)]
         joint = np.concatenate([*pairs, np.array(corners, dtype=np.int64).reshape(-1, 2)])
         limit = np.full(len(joint), GRADE_LIMIT)
@@ -133,7 +146,7 @@ class ChainEnergy:
             by_gap = by_gap - np.bincount(self._first, slope / gap[self._first], minlength=len(gap))
         over = self._over(turning)
         energy += TURN_WEIGHT * float(over @ over)
-        by_turn = self._to_ends(2.0 * TURN_WEIGHT / TURN_LIMIT * over) if over.any() else np.zeros(self.slide)
+        by_turn = self._to_ends(2.0 * TURN_WEIGHT / self._turn_limit * over) if over.any() else np.zeros(self.slide)
         return energy, self._to_ends(by_gap), by_turn
 
     def hessian(self, s: Float, turning: Float, length: Float, rate: Float) -> tuple[Float, Float]:
@@ -156,7 +169,7 @@ class ChainEnergy:
         by_gap = np.stack([-length[self._start], length[self._end]])
         by_turn = by_gap * np.stack([rate[self._start], rate[self._end]])
         second_gap = GAP_WEIGHT * self._weight * self._rest / gap**3
-        second_turn = np.where(self._over(turning) > 0.0, 2.0 * TURN_WEIGHT / TURN_LIMIT**2, 0.0)
+        second_turn = np.where(self._over(turning) > 0.0, 2.0 * TURN_WEIGHT / self._turn_limit**2, 0.0)
         edges: Float = second_gap * by_gap[:, None] * by_gap + second_turn * by_turn[:, None] * by_turn
         one, two = self._first, self._second
         root = np.where(self._excess(gap) != 0.0, np.sqrt(2.0 * GRADE_WEIGHT), 0.0)
@@ -171,7 +184,7 @@ class ChainEnergy:
 
     def _over(self, turning: Float) -> Float:
         angle = np.concatenate([turning, self._turning])
-        over: Float = np.maximum((angle[self._end] - angle[self._start]) / TURN_LIMIT - 1.0, 0.0) * self._weight
+        over: Float = np.maximum((angle[self._end] - angle[self._start]) / self._turn_limit - 1.0, 0.0) * self._weight
         return over
 
     def _to_ends(self, by_difference: Float) -> Float:

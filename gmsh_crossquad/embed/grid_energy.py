@@ -55,7 +55,7 @@ class GridEnergy:
         row = np.full(n, -1)
         row[self._inner] = np.arange(inner)
         row[self._slide] = np.arange(slide)
-        self._chains = ChainEnergy(guide, model, rest.chains, self._table, row, slide)
+        self._chains = ChainEnergy(guide, model, rest.chains, self._table, row, slide, rest.turns)
         # A vertex has one plane position, a node, in every face that it belongs to; a node of an interior vertex comes
         # first, then those of sliding vertices, then the fixed ones.
         key = guide.quad_face[:, None] * n + guide.quads

@@ -18,17 +18,33 @@ SMALLEST_STEP = 0.1
 
 
 def coons(grid: Float) -> Float:
-    """Fill the inside of a grid (a + 1, b + 1, d) from its sides by bilinearly blended transfinite interpolation."""
-    out = grid.copy()
+    """Fill the inside of a grid (a + 1, b + 1, d) from its sides by blended transfinite interpolation (Coons).
+
+    Lines between the two long sides; what the short sides deviate from such lines is added, weighted by (1 - u)^p with u the
+    way along from that side and p the aspect ratio: it fades out over one width, so that a strip that narrows stays inside.
+    """
     a, b = grid.shape[0] - 1, grid.shape[1] - 1
     if a < 2 or b < 2:
-        return out
+        return grid.copy()
+    length = [0.5 * (_length(g[:, 0]) + _length(g[:, -1])) for g in (grid, grid.swapaxes(0, 1))]
+    if length[0] < length[1]:
+        return _ruled(grid.swapaxes(0, 1), length[1] / max(length[0], np.finfo(float).tiny)).swapaxes(0, 1)
+    return _ruled(grid, length[0] / max(length[1], np.finfo(float).tiny))
+
+
+def _ruled(grid: Float, power: float) -> Float:
+    out = grid.copy()
+    a, b = grid.shape[0] - 1, grid.shape[1] - 1
     u = (np.arange(1, a) / a)[:, None, None]
     v = (np.arange(1, b) / b)[None, :, None]
-    bottom, top, left, right = grid[1:-1, :1], grid[1:-1, -1:], grid[:1, 1:-1], grid[-1:, 1:-1]
-    corners = (1 - u) * (1 - v) * grid[0, 0] + u * (1 - v) * grid[a, 0] + (1 - u) * v * grid[0, b] + u * v * grid[a, b]
-    out[1:-1, 1:-1] = (1 - v) * bottom + v * top + (1 - u) * left + u * right - corners
+    lines = (1 - v) * grid[:, :1] + v * grid[:, -1:]
+    left, right = grid[:1, 1:-1] - lines[:1], grid[-1:, 1:-1] - lines[-1:]
+    out[1:-1, 1:-1] = lines[1:-1] + (1 - u) ** power * left + u**power * right
     return out
+
+
+def _length(line: Float) -> float:
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None = None) -> Guide:

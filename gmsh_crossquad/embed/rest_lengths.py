@@ -5,7 +5,8 @@ one length l, in three steps on u = log l:
 
 1. the mean over the quads at the edge; once the grid is untangled, the mean of that and the log of the actual length,
    since the layout does not know how wide a patch will become; an edge between two fixed vertices of a curve keeps its
-   true length; where a curve turns along an edge by T > `TURN`, the edge is shortened by T / TURN;
+   true length; where a curve turns along an edge by T > `TURN`, the edge is shortened by T / TURN, and where the bulge
+   l T / 8 over the edge is more than `SAGITTA` of the height of the quad beside it, to the length that has this bulge;
 2. diffusion between neighbours, anchored at step 1:  u <- (ANCHOR u0 + sum u_n) / (ANCHOR + number), where the
    neighbours are the opposite edges in the quads (across) and the continuing edges at the vertices (along);
 3. where two neighbours still differ by more than `LEAST_RATIO`, both move half of the excess.
@@ -35,8 +36,10 @@ TURN = float(np.radians(40.0))
 """Wanted greatest turning of a curve along one edge."""
 SHORTEST = 1e-4
 """Present lengths count as at least this part of `quad_size`."""
-FARTHEST = 1.3
-"""The mean with the present length differs from that by no more than this factor."""
+SAGITTA = 0.3
+"""Wanted greatest bulge of a curve over an edge, of the height of the quad beside it."""
+FARTHEST = 2.0
+"""Rest lengths differ from present ones, where these count, by no more than this factor."""
 LEAST_RATIO = 2.0
 """Rest lengths of neighbours differ by no more than this factor, where they are free."""
 
@@ -53,6 +56,8 @@ class RestLengths:
         The same for squares of the same area: the geometric mean of the sides.
     chains : tuple of (k,) float64
         Lengths of the edges along every curve, adding up to the arc length between its fixed vertices.
+    turns : tuple of (k,) float64
+        Turning of the curve along every edge at which it bulges by `SAGITTA`; inf where it bulges by less now.
     vertices : (n,) float64
         Mean length at every vertex.
     """
@@ -60,6 +65,7 @@ class RestLengths:
     sides: Float
     even: Float
     chains: tuple[Float, ...]
+    turns: tuple[Float, ...]
     vertices: Float
 
 
@@ -92,12 +98,17 @@ def rest_lengths(
     count = np.bincount(edge_rows.ravel(), minlength=len(edges))
     sides = np.log(guide.quad_size[:, [0, 1, 0, 1]])
     own = np.bincount(edge_rows.ravel(), sides.ravel(), minlength=len(edges)) / count
+    chain_edges = _chain_edges(guide, model, edges)
+    low, tight = np.full((2, len(edges)), np.inf)
+    turns = tuple(np.full(len(rows), np.inf) for rows in chain_edges)
     if actual > 0.0:
         vector = guide.points[edges[:, 1]] - guide.points[edges[:, 0]]
         present = 0.5 * np.log(np.maximum(np.einsum("ec,ec->e", vector, vector), np.finfo(float).tiny))
         present = np.maximum(present, own + np.log(SHORTEST))
-        own = present + np.clip((1.0 - actual) * (own - present), -np.log(FARTHEST), np.log(FARTHEST))
-    chain_edges = _chain_edges(guide, model, edges)
+        for k in range(4):
+            height = 0.5 * np.exp(present[edge_rows[:, k - 1]]) + 0.5 * np.exp(present[edge_rows[:, (k + 1) % 4]])
+            np.minimum.at(low, edge_rows[:, k], height)
+        own = (1.0 - actual) * own + actual * present
     held = np.zeros(len(edges), dtype=bool)
     for row, rows in enumerate(chain_edges):
         fixed = guide.fixed[guide.chains[row]].copy()
@@ -110,8 +121,20 @@ def rest_lengths(
             own[rows[single]] = np.log(np.diff(places)[single])
             turning = np.diff(table.at(np.full(len(places), row), places)[0][:, 3])
             own[rows[~single]] -= np.log(np.maximum(turning[~single] / TURN, 1.0))
-    pairs = _neighbours(guide, chain_edges, edges, edge_rows)
-    length = np.exp(_limit(_diffuse(own, pairs, held), pairs, held) if graded else own)
+            if actual > 0.0:
+                gap = np.diff(places)
+                bulge = np.divide(gap * turning / 8.0, SAGITTA * low[rows], out=np.zeros(len(gap)), where=low[rows] > 0.0)
+                most = np.log(gap) - 0.5 * np.log(np.maximum(bulge, 1.0))
+                tight[rows[~single]] = np.where(bulge > 1.0, most, np.inf)[~single]
+                turns[row][~single] = np.where(bulge > 1.0, turning / np.sqrt(np.maximum(bulge, 1.0)), np.inf)[~single]
+    own = np.minimum(own, tight)
+    if graded:
+        pairs = _neighbours(guide, chain_edges, edges, edge_rows)
+        own = _limit(_diffuse(own, pairs, held), pairs, held)
+        if actual > 0.0:
+            own = present + np.clip(own - present, -np.log(FARTHEST), np.log(FARTHEST))
+            own = np.minimum(own, tight)
+    length = np.exp(own)
     chains = tuple(
         _fill_chain(length[rows], guide, model, row) if len(rows) else np.zeros(0) for row, rows in enumerate(chain_edges)
     )
@@ -130,6 +153,7 @@ def rest_lengths(
         sides=per_quad * scale,
         even=np.tile(np.sqrt(target) * scale, (4, 1)),
         chains=chains,
+        turns=turns,
         vertices=np.exp(at_vertex / np.maximum(degree, 1)),
     )
 
