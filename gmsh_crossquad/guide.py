@@ -33,6 +33,8 @@ MOST_QUADS = 25_000
 STEEP = np.radians(60.0)
 STEEP_ROUND = np.radians(20.0)
 LOST = 0.016
+# bulge of a curve over an edge, of the height of the bad cell beside it, from which only the edge is divided
+BULGE = 0.3
 
 Evaluate = Callable[[int, Float], Float]
 
@@ -144,9 +146,8 @@ def smooth_guide(
         if round_ + 1 < 2 * ROUNDS:
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
-        _, quad_edges, chord, _ = guide_chords(guide.quads)
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[np.union1d(chord[quad_edges[bad]], steep)])] *= 2
+        finer[np.unique(coarse_chord[np.union1d(_chords_of(model, guide, bad), steep)])] *= 2
     assert best is not None
     (folds, _, quality), guide, fine = best
     if folds:
@@ -157,6 +158,34 @@ def smooth_guide(
     return GuideResult(guide, fine, quality, tuple(notes))
 
 
+def _chords_of(model: Model, guide: Guide, bad: Int) -> Int:
+    """Chords of the guide whose division makes bad cells better: only that along a curve edge, where the curve bulges over it
+    by much of the cell's height; else both."""
+    edges, quad_edges, chord, _ = guide_chords(guide.quads)
+    bulge = np.zeros(len(edges))
+    for row, length, turn in _curve_edges(model, guide, edges):
+        bulge[row] = length * turn / 8.0
+    length = np.linalg.norm(guide.points[edges[:, 1]] - guide.points[edges[:, 0]], axis=1)
+    mine = quad_edges[bad]
+    height = np.minimum(length[np.roll(mine, 1, axis=1)], length[np.roll(mine, -1, axis=1)])
+    over = bulge[mine] > BULGE * height
+    over[~over.any(axis=1)] = True
+    return np.unique(chord[mine[over]])
+
+
+def _curve_edges(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Float, Float]]:
+    """For every curve the rows of `edges` of its guide edges, their arc lengths and their turning."""
+    n = len(guide.points)
+    keys = edges[:, 0] * n + edges[:, 1]
+    out = []
+    for curve, chain in zip(model.curves, guide.chains):
+        places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
+        s, total = cumulative_turning(curve.points, curve.arclength)
+        row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
+        out.append((row, np.diff(places), np.abs(np.diff(np.interp(places, s, total)))))
+    return out
+
+
 def _steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
     """Guide chords of edges on CAD curves that the final edges do not follow well enough.
 
@@ -164,22 +193,16 @@ def _steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
     `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.
     """
     edges, _, chord, _ = guide_chords(guide.quads)
-    n = len(guide.points)
-    keys = edges[:, 0] * n + edges[:, 1]
     diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
     areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
     face_area = np.bincount(guide.quad_face, areas, minlength=len(model.faces))
     rows, turns = [], []
     lost = np.zeros(len(model.curves))
-    for c, (curve, chain) in enumerate(zip(model.curves, guide.chains)):
-        places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
-        s, total = cumulative_turning(curve.points, curve.arclength)
-        row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
+    for c, (row, length, turn) in enumerate(_curve_edges(model, guide, edges)):
         pieces = fine[chord[row]]
-        turn = np.abs(np.diff(np.interp(places, s, total))) / pieces
-        lost[c] = np.sum(np.diff(places) ** 2 / pieces * turn / 12)
         rows.append(row)
-        turns.append(turn)
+        turns.append(turn / pieces)
+        lost[c] = np.sum(length**2 / pieces * turns[-1] / 12)
     limit = np.full(len(model.curves), STEEP)
     for f, face in enumerate(model.faces):
         around = [c for loop in face.loops for c, _ in loop]

@@ -46,6 +46,7 @@ LEAST_AREA = 1e-3
 LEAST_EPS = 1e-4
 FEW_ROUNDS = 4
 DOUBTFUL = 0.05
+KEPT = 0.9
 STARTS = ("placed", "given", "laplace")
 VALID = 1e-6
 """Scaled Jacobian from which a grid is inside the barrier beyond doubt."""
@@ -119,7 +120,7 @@ def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths
     for power, effort in POLISHING:
         latest = _polish(latest, model, table, rest, power, effort, barrier=now > VALID)
         now = float(guide_quality(latest, model).min())
-        if min(now, GOOD) >= min(quality, GOOD):
+        if min(now, GOOD) >= KEPT * min(quality, GOOD):
             best, quality = latest, now
     if VALID < quality < WANTED:
         polished = _polish(best, model, table, rest, *SHARPENING, barrier=True)
