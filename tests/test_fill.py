@@ -467,7 +467,7 @@ def test_cells_beside_bulging_edges_do_not_fold(monkeypatch: pytest.MonkeyPatch)
     mesh = fill(model, guide, uniform(guide, 8), straight(model))
     quality = scaled_jacobian(mesh.points, mesh.quads, UP)
     assert quality.min() > 0
-    monkeypatch.setattr(pipeline, "ROUNDS", 0)
+    monkeypatch.setattr(pipeline, "SHARES", ())
     with pytest.raises(MeshError, match="fold"):
         fill(model, guide, uniform(guide, 8), straight(model))
 
@@ -481,7 +481,7 @@ def test_sides_of_a_thin_cell_do_not_shear_it(monkeypatch: pytest.MonkeyPatch) -
     guide = make_guide(model, xy, quads, [(0, 1), (1, 2), (2, 8, 3), (3, 5, 4), (4, 6, 0)])
     mesh = fill(model, guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() > 0.5
-    monkeypatch.setattr(pipeline, "ROUNDS", 0)
+    monkeypatch.setattr(pipeline, "SHARES", ())
     mesh = fill(model, guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() < 0.3
 

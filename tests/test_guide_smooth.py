@@ -88,7 +88,7 @@ def test_an_even_rectangle_stays() -> None:
     out, report = smooth(guide, model)
     assert out.points == pytest.approx(guide.points, abs=1e-12)
     assert report.min_scaled_jacobian == pytest.approx(1.0, abs=1e-12)
-    assert (report.rounds, report.start) == (0, "given")
+    assert (report.rounds, report.start) == (0, "placed")
 
 
 @pytest.mark.parametrize("name", ["ring", "ell", "fold"])

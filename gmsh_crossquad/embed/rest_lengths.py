@@ -69,9 +69,7 @@ class RestLengths:
     vertices: Float
 
 
-def rest_lengths(
-    guide: Guide, model: Model, table: CurveTable, *, actual: float = 0.0, graded: bool = True
-) -> RestLengths:
+def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: float = 0.0, graded: bool = True) -> RestLengths:
     """Make the sizes of a guide grid consistent.
 
     Parameters

@@ -1,17 +1,21 @@
 """Fold-over-free smoothing of the guide grid.
 
 1. The vertices on curves are brought into strict order; rest lengths are made (`rest_lengths`).
-2. *Untangling* towards squares of the local area: minimise the regularised energy (power 1) for a sequence of
+2. *Untangling*: minimise the regularised energy (power 1) for a sequence of
 
-       eps_k = max(1e-3, sqrt(1e-6 + 0.04 min(D)^2)),
+       eps_k = max(1e-4, min(eps_(k-1) / 2, sqrt(1e-6 + 0.04 min(D)^2))),
 
-   until every corner has an area above `LEAST_AREA` of its rest area.
-3. If that fails, the same from the uniform Laplace start.
-4. *Polishing* towards the rest lengths with power 4 and eps = 0: a barrier, so that no corner can turn over.
-5. *Sharpening*: the same with power 12, which cares for the worst corners only, if these are still poor.
+   until every corner has an area above `LEAST_AREA` of its rest area.  The rest lengths of the first attempt, "placed", are
+   those of the given grid as it is: most of it is good, thin gaps, fans and bundles included, and what is wrong is mended
+   near where it lies.  Measured on a wing of 526 edges, 1/250 of the domain: 2 rounds leave no inverted cell, while
+   squares of the local area ("even") leave 200 to 1,000 of 7,388 after 12.  A grid with more than `TRUSTED` of its quads
+   inverted starts with "even", and where the first attempt ends below `DOUBTFUL`, the other one is tried too.
+3. *Polishing* towards the rest lengths with power 4 and eps = 0: a barrier, so that no corner can turn over.
+4. *Sharpening*: the same with power 12, which cares for the worst corners only, if these are still poor.
+5. If no attempt is valid, all this from the uniform Laplace start.
 
-The candidate with the greatest least scaled Jacobian is kept; above `GOOD` they count as equal, and the most polished one
-is kept for its sizes.
+The attempt with the greatest least scaled Jacobian is kept.  Within an attempt the most polished grid is kept that has `KEPT`
+of the best one's; above `GOOD` they count as equal.
 
 References
 ----------
@@ -45,9 +49,13 @@ WANTED = 0.85
 LEAST_AREA = 1e-3
 LEAST_EPS = 1e-4
 FEW_ROUNDS = 4
+"""Greatest number of untangling rounds where another start has led to a valid grid."""
 DOUBTFUL = 0.05
+"""Least scaled Jacobian up to which another start is tried."""
+TRUSTED = 0.15
+"""Share of inverted quads up to which the given lengths are worth keeping."""
 KEPT = 0.9
-STARTS = ("placed", "given", "laplace")
+"""Part of the least scaled Jacobian that a polishing round must keep."""
 VALID = 1e-6
 """Scaled Jacobian from which a grid is inside the barrier beyond doubt."""
 GOOD = 0.7
@@ -65,7 +73,7 @@ class SmoothReport:
     rounds : int
         Untangling rounds.
     start : str
-        "given" or "laplace": the start that led to the result.
+        "placed", "even" or "laplace": the start that led to the result.
     """
 
     min_scaled_jacobian: float
@@ -98,8 +106,10 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     given = spread_chains(guide, model, table)
     rest = rest_lengths(given, model, table)
     placed = rest_lengths(given, model, table, actual=1.0, graded=False)
-    best, quality, chosen, rounds = given, -np.inf, STARTS[0], 0
-    for name in STARTS:
+    tangled = float(np.mean(guide_quality(given, model) <= 0.0))
+    order = ("placed", "even", "laplace") if tangled <= TRUSTED else ("even", "placed", "laplace")
+    best, quality, chosen, rounds = given, -np.inf, order[0], 0
+    for name in order:
         start = laplace_start(given, model, table) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
         candidate, used, valid = _untangle(start, model, table, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
@@ -107,7 +117,7 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
         candidate, score = _polish_all(candidate, model, table, rest)
         if score > quality or (valid and quality <= 0.0):
             best, quality, chosen = candidate, score, name
-        if quality > (DOUBTFUL if name == "placed" else 0.0):
+        if quality > (DOUBTFUL if name == order[0] else 0.0):
             break
     final = guide_quality(best, model)
     return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen)
