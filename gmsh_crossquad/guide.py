@@ -10,6 +10,7 @@ import numpy as np
 from .embed.place import place
 from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
+from .fill.curve_fit import misfits
 from .fill.numbering import guide_chords
 from .fill.pipeline import poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
@@ -22,7 +23,7 @@ from .watch import Watch
 
 __all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
 
-# refinements of a layout: twice as many rounds where only a few cells are left, no more cells than this factor allows, and only
+# refinements of a layout: twice as many rounds where only a few folded cells are left, no more cells than this factor allows, and only
 # of grids whose scaled Jacobian is worth it
 ROUNDS = 3
 FEW = 4
@@ -35,6 +36,10 @@ STEEP_ROUND = np.radians(20.0)
 LOST = 0.016
 # bulge of a curve over an edge, of the height of the bad cell beside it, from which only the edge is divided
 BULGE = 0.3
+# edges on curves this far, in lengths of their neighbours, from these are halved, a few times, while the mesh stays below this factor
+MISFIT = 0.25
+GRADINGS = 6
+MOST_GRADED = 1.5
 
 Evaluate = Callable[[int, Float], Float]
 
@@ -139,7 +144,7 @@ def smooth_guide(
             best = score, guide, fine
         elif len(report.inverted) > -best[0][0]:
             break
-        if round_ + 1 >= ROUNDS and len(bad) > FEW:
+        if round_ + 1 >= ROUNDS and (len(bad) > FEW or not len(folded)):
             break
         if not (len(bad) or len(steep)) or report.min_scaled_jacobian < WORTH_REFINING:
             break
@@ -155,6 +160,11 @@ def smooth_guide(
             f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",
             remedy="a smaller size may help",
         )
+    with watch.stage("fill"):
+        graded = _graded(model, guide, fine)
+        if (graded != fine).any() and not len(poor_cells(model, guide, graded, evaluate, vertices)[1]):
+            notes.append("edges on curves beside much shorter ones were divided")
+            fine = graded
     return GuideResult(guide, fine, quality, tuple(notes))
 
 
@@ -212,6 +222,38 @@ def _steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
     for row, turn, most in zip(rows, turns, limit):
         steep[row] = turn > most
     return np.unique(chord[steep])
+
+
+def _graded(model: Model, guide: Guide, fine: Int) -> Int:
+    """Final edges per guide edge of every guide chord, doubled where edges on curves are much longer than those beside them."""
+    edges, quad_edges, chord, _ = guide_chords(guide.quads)
+    curves = _curve_edges(model, guide, edges)
+    prescribed = np.zeros(len(fine), bool)
+    for curve, (row, _, _) in zip(model.curves, curves):
+        if curve.spacing is not None:
+            prescribed[chord[row]] = True
+
+    def size(pieces: Int) -> int:
+        return int(np.prod(pieces[chord[quad_edges[:, :2]]], axis=1).sum())
+
+    most = int(MOST_GRADED * size(fine))
+    for _ in range(GRADINGS):
+        start, end, owner = [], [], []
+        for curve, (row, length, _) in zip(model.curves, curves):
+            pieces = fine[chord[row]]
+            steps = np.concatenate([[0.0], np.cumsum(np.repeat(length / pieces, pieces))])
+            points = curve.at(np.minimum(steps, curve.length))
+            start.append(points[:-1])
+            end.append(points[1:])
+            owner.append(np.repeat(row, pieces))
+        wrong = chord[np.concatenate(owner)[misfits(np.concatenate(start), np.concatenate(end)) > MISFIT]]
+        more = fine.copy()
+        more[np.unique(wrong)] *= 2
+        more[prescribed] = fine[prescribed]
+        if (more == fine).all() or size(more) > most:
+            break
+        fine = more
+    return fine
 
 
 def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gmsh_crossquad.embed.chain_energy import GAP_WEIGHT, GRADE_WEIGHT, ChainEnergy
+from gmsh_crossquad.embed.chain_energy import GAP_WEIGHT, GRADE_WEIGHT, TURN_WEIGHT, ChainEnergy
 from gmsh_crossquad.embed.curve_table import CurveTable
 from gmsh_crossquad.embed.energy import AREA_WEIGHT, corner_areas, corner_energy, corner_hessian
 from gmsh_crossquad.embed.grid_energy import GridEnergy
 from gmsh_crossquad.embed.quality import CHUNK, guide_quality, scaled_jacobian
-from gmsh_crossquad.embed.rest_lengths import rest_lengths
+from gmsh_crossquad.embed.rest_lengths import SAGITTA, rest_lengths
 from gmsh_crossquad.embed.start import spread_chains
 from gmsh_crossquad.records import Float
 from tests.smoothing_grids import ell, fold, mapped_grid, rectangle, ring, sector, shaken
@@ -204,6 +204,37 @@ def test_chain_terms_by_hand() -> None:
     assert chains.value(moved, np.zeros(4))[0] == pytest.approx(expected)
     for wrong in ([0.5, 0.5, 0.3, 0.6], [0.6, 0.5, 0.3, 0.6], [-0.1, 0.5, 0.3, 0.6]):
         assert chains.value(np.array(wrong), np.zeros(4))[0] == np.inf
+
+
+def test_turning_costs_from_the_limit_of_its_edge() -> None:
+    guide, model = mapped_grid(rectangle(), 3, 1)
+    table = CurveTable(model.curves)
+    row = np.full(len(guide.points), -1)
+    row[guide.chains[0][1:-1]] = [0, 1]
+    row[guide.chains[2][1:-1]] = [2, 3]
+    third, none = np.full(3, 1 / 3), np.full(3, np.inf)
+    turns = (np.array([0.1, np.inf, np.inf]), none[:1], none, none[:1])
+    chains = ChainEnergy(guide, model, (third, np.ones(1), third, np.ones(1)), table, row, 4, turns)
+    even = np.array([1 / 3, 2 / 3, 1 / 3, 2 / 3])
+    base = chains.value(even, np.zeros(4))[0]
+    turning = np.array([0.3, 0.6, 0.0, 0.0])  # .3 on the first two edges
+    energy, _, by_turn = chains.value(even, turning)
+    assert energy - base == pytest.approx(TURN_WEIGHT * (0.3 / 0.1 - 1) ** 2)
+    assert by_turn[:2] == pytest.approx([2 * TURN_WEIGHT / 0.1 * 2, 0.0])
+
+
+def test_rest_lengths_leave_no_bulge_beside_thin_cells() -> None:
+    """One row of quads of height w between an arc of radius 1 and a concentric one: the bulge is l^2 / 8."""
+    height = 0.01
+    guide, model = mapped_grid(sector(1.0, 1.0 + height, 1.0), 1, 4)
+    table = CurveTable(model.curves)
+    for actual in (0.5, 1.0):
+        rest = rest_lengths(guide, model, table, actual=actual)
+        limits = np.concatenate([t for t in rest.turns if len(t) == 4])
+        assert limits == pytest.approx(np.sqrt(8 * SAGITTA * height), rel=2e-2)
+    assert all(np.isinf(t).all() for t in rest_lengths(guide, model, table).turns)
+    wide, wide_model = mapped_grid(sector(1.0, 2.0, 1.0), 1, 4)
+    assert all(np.isinf(t).all() for t in rest_lengths(wide, wide_model, CurveTable(wide_model.curves), actual=1.0).turns)
 
 
 def test_chain_hessian_is_the_second_derivative_where_nothing_is_dropped() -> None:

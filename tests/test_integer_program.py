@@ -77,6 +77,17 @@ def test_solutions_are_feasible_and_no_better_than_the_optimum(seed):
     assert solution.bound - 1e-9 <= exact.fun <= solution.cost + 1e-6
 
 
+def test_columns_that_are_not_integral_may_be_fractions():
+    # x - s <= 0.5 with 3 <= 2 x: x = 2 and s = 1.5 at the least, and branching on s would never end
+    program = IntegerProgram(np.array([1.0]), np.array([10.0]))
+    assert program.add_columns(np.array([1.0]), np.array([np.inf]), integral=False) == 1
+    dense(program, [[1, -1], [2, 0]], [-np.inf, 3], [0.5, np.inf])
+    solution = program.solve()
+    assert solution is not None
+    assert solution.values[0] == 2
+    assert solution.cost == pytest.approx(3.5)
+
+
 def test_the_solver_says_nothing():
     code = (
         "import numpy as np\nfrom gmsh_crossquad.layout.integer_program import IntegerProgram\n"

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gmsh_crossquad.embed.place import coons, place
+from gmsh_crossquad.embed.place import _carry, coons, place
 from gmsh_crossquad.errors import LayoutError
 from gmsh_crossquad.layout.chords import arc_divisions, find_chords
 from gmsh_crossquad.layout.cuts import separation_cuts
@@ -155,6 +155,43 @@ def test_coons_reproduces_bilinear_maps():
     blank = exact.copy()
     blank[1:-1, 1:-1] = 0
     assert np.allclose(coons(blank), exact)
+
+
+def test_a_strip_that_narrows_stays_inside():
+    """Flat top, a parabola below it that leaves a gap of 1e-3; the left side is bent, which must not reach the gap."""
+    x = np.linspace(-1, 1, 21)
+    bottom = np.stack([x, -1e-3 - 0.2 * x**2], axis=1)
+    top = np.stack([x, 0 * x], axis=1)
+    v = np.linspace(0, 1, 6)
+    left = bottom[0] + v[:, None] * (top[0] - bottom[0]) + np.stack([0 * v, 0.1 * np.sin(np.pi * v)], axis=1)
+    grid = np.zeros((21, 6, 2))
+    grid[:, 0], grid[:, -1], grid[0], grid[-1] = bottom, top, left, bottom[-1] + v[:, None] * (top[-1] - bottom[-1])
+    inside = coons(grid)
+    assert (np.diff(inside[8:13, :, 1], axis=1) > 0).all()
+    assert np.allclose(coons(grid.swapaxes(0, 1)), inside.swapaxes(0, 1))
+
+
+def test_vertices_follow_the_shift_of_the_ends_of_their_arcs():
+    n = np.full(10, 4, np.int64)
+    q = quotient(TMESH, n)
+    element = np.zeros((len(q.vertex), 3))
+    element[: len(TMESH.position)] = TMESH.position
+    for arc in range(10):
+        a, b = TMESH.position[TMESH.arcs[arc]]
+        rows = q.offset[arc] + np.arange(3)
+        element[rows] = a + np.arange(1, 4)[:, None] / 4 * (b - a)
+    points = np.zeros((q.n_vertices, 3))
+    joinable = np.flatnonzero(q.vertex[: q.n_joinable] >= 0)
+    points[q.vertex[joinable]] = element[joinable]
+    held = np.zeros(q.n_vertices, bool)
+    held[q.vertex[: len(TMESH.position)]] = True
+    shift = np.array([0.1, 0.2, 0.0])
+    points[q.vertex[3]] += shift  # the re-entrant corner, where arcs 8 and 9 start
+    moved = _carry(TMESH, q, element, points, held)
+    for arc in (8, 9):
+        inside = q.vertex[q.offset[arc] + np.arange(3)]
+        expected = element[q.offset[arc] + np.arange(3)] + np.array([[0.75], [0.5], [0.25]]) * shift
+        assert np.allclose(moved[inside], expected)
 
 
 def test_turning_of_a_circle():
