@@ -10,11 +10,11 @@ import numpy as np
 from .embed.place import place
 from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
-from .fill.curve_fit import misfits
+from .fill.curve_edges import chords_to_divide, graded, steep_chords
 from .fill.numbering import guide_chords
 from .fill.pipeline import poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
-from .layout.divisions import ChordDivisions, chord_divisions, cumulative_turning
+from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.quantize import quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
@@ -23,24 +23,13 @@ from .watch import Watch
 
 __all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
 
-# refinements of a layout: twice as many rounds where only a few folded cells are left, no more cells than this factor allows, and only
-# of grids whose scaled Jacobian is worth it
+# refinements of a layout: twice as many rounds where only a few folded cells are left, no more cells than this factor allows,
+# and only of grids whose scaled Jacobian is worth it
 ROUNDS = 3
 FEW = 4
 GROWTH = 3
 WORTH_REFINING = 0.02
 MOST_QUADS = 25_000
-# greatest turning of a final edge on a curve; the smaller one where the edges lose more than this part of a face's area
-STEEP = np.radians(60.0)
-STEEP_ROUND = np.radians(20.0)
-LOST = 0.016
-# bulge of a curve over an edge, of the height of the bad cell beside it, from which only the edge is divided
-BULGE = 0.3
-# edges on curves this far, in lengths of their neighbours, from these are halved, a few times, while the mesh stays below this factor
-MISFIT = 0.25
-GRADINGS = 6
-MOST_GRADED = 1.5
-
 Evaluate = Callable[[int, Float], Float]
 
 
@@ -138,7 +127,7 @@ def smooth_guide(
         if not len(bad):
             with watch.stage("fill"):
                 bad, folded = poor_cells(model, guide, fine, evaluate, vertices)
-                steep = _steep_chords(model, guide, fine)
+                steep = steep_chords(model, guide, fine)
         score = (-len(folded), -len(steep), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
@@ -152,7 +141,7 @@ def smooth_guide(
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[np.union1d(_chords_of(model, guide, bad), steep)])] *= 2
+        finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, guide, bad), steep)])] *= 2
     assert best is not None
     (folds, _, quality), guide, fine = best
     if folds:
@@ -161,99 +150,11 @@ def smooth_guide(
             remedy="a smaller size may help",
         )
     with watch.stage("fill"):
-        graded = _graded(model, guide, fine)
-        if (graded != fine).any() and not len(poor_cells(model, guide, graded, evaluate, vertices)[1]):
+        halved = graded(model, guide, fine)
+        if (halved != fine).any() and not len(poor_cells(model, guide, halved, evaluate, vertices)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
-            fine = graded
+            fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))
-
-
-def _chords_of(model: Model, guide: Guide, bad: Int) -> Int:
-    """Chords of the guide whose division makes bad cells better: only that along a curve edge, where the curve bulges over it
-    by much of the cell's height; else both."""
-    edges, quad_edges, chord, _ = guide_chords(guide.quads)
-    bulge = np.zeros(len(edges))
-    for row, length, turn in _curve_edges(model, guide, edges):
-        bulge[row] = length * turn / 8.0
-    length = np.linalg.norm(guide.points[edges[:, 1]] - guide.points[edges[:, 0]], axis=1)
-    mine = quad_edges[bad]
-    height = np.minimum(length[np.roll(mine, 1, axis=1)], length[np.roll(mine, -1, axis=1)])
-    over = bulge[mine] > BULGE * height
-    over[~over.any(axis=1)] = True
-    return np.unique(chord[mine[over]])
-
-
-def _curve_edges(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Float, Float]]:
-    """For every curve the rows of `edges` of its guide edges, their arc lengths and their turning."""
-    n = len(guide.points)
-    keys = edges[:, 0] * n + edges[:, 1]
-    out = []
-    for curve, chain in zip(model.curves, guide.chains):
-        places = np.concatenate([[0.0], guide.arclength[chain[1:-1]], [curve.length]])
-        s, total = cumulative_turning(curve.points, curve.arclength)
-        row = np.searchsorted(keys, np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:]))
-        out.append((row, np.diff(places), np.abs(np.diff(np.interp(places, s, total)))))
-    return out
-
-
-def _steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
-    """Guide chords of edges on CAD curves that the final edges do not follow well enough.
-
-    An edge may turn by `STEEP`.  An edge of length l that turns by t cuts about l^2 t / 12 off; where that adds up to more than
-    `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.
-    """
-    edges, _, chord, _ = guide_chords(guide.quads)
-    diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
-    areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
-    face_area = np.bincount(guide.quad_face, areas, minlength=len(model.faces))
-    rows, turns = [], []
-    lost = np.zeros(len(model.curves))
-    for c, (row, length, turn) in enumerate(_curve_edges(model, guide, edges)):
-        pieces = fine[chord[row]]
-        rows.append(row)
-        turns.append(turn / pieces)
-        lost[c] = np.sum(length**2 / pieces * turns[-1] / 12)
-    limit = np.full(len(model.curves), STEEP)
-    for f, face in enumerate(model.faces):
-        around = [c for loop in face.loops for c, _ in loop]
-        if lost[around].sum() > LOST * face_area[f]:
-            limit[around] = STEEP_ROUND
-    steep = np.zeros(len(edges), bool)
-    for row, turn, most in zip(rows, turns, limit):
-        steep[row] = turn > most
-    return np.unique(chord[steep])
-
-
-def _graded(model: Model, guide: Guide, fine: Int) -> Int:
-    """Final edges per guide edge of every guide chord, doubled where edges on curves are much longer than those beside them."""
-    edges, quad_edges, chord, _ = guide_chords(guide.quads)
-    curves = _curve_edges(model, guide, edges)
-    prescribed = np.zeros(len(fine), bool)
-    for curve, (row, _, _) in zip(model.curves, curves):
-        if curve.spacing is not None:
-            prescribed[chord[row]] = True
-
-    def size(pieces: Int) -> int:
-        return int(np.prod(pieces[chord[quad_edges[:, :2]]], axis=1).sum())
-
-    most = int(MOST_GRADED * size(fine))
-    for _ in range(GRADINGS):
-        start, end, owner = [], [], []
-        for curve, (row, length, _) in zip(model.curves, curves):
-            pieces = fine[chord[row]]
-            steps = np.concatenate([[0.0], np.cumsum(np.repeat(length / pieces, pieces))])
-            points = curve.at(np.minimum(steps, curve.length))
-            start.append(points[:-1])
-            end.append(points[1:])
-            owner.append(np.repeat(row, pieces))
-        wrong = chord[np.concatenate(owner)[misfits(np.concatenate(start), np.concatenate(end)) > MISFIT]]
-        more = fine.copy()
-        more[np.unique(wrong)] *= 2
-        more[prescribed] = fine[prescribed]
-        if (more == fine).all() or size(more) > most:
-            break
-        fine = more
-    return fine
 
 
 def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:
