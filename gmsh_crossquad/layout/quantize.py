@@ -2,7 +2,7 @@
 
     min sum_a f_a(n_a),  n_a >= 0 integer,
     equal sums on opposite sides of every patch, every open CAD curve >= 1, closed curve >= 3, boundary loop >= 3,
-    separation cuts (module `cuts`), found lazily.
+    separation cuts (module `cuts`), found lazily; shifts between the sides of thin strips cost (module `alignment`).
 
 t_a is the arc's length over the wanted block size.  The cost is the factor by which edges miss their size,
 f(n) = t/n - 1 for 1 <= n <= t, (n - t) / max(t, 1/2) for n > t, and f(0) = 2 t: convex.  It is taken piecewise linear with
