@@ -119,9 +119,9 @@ def smooth_guide(
             start = place(model, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
             coarse_chord = _coarse_chords(tmesh, q, chords, divisions)
             fine = divisions.fine[coarse_chord]
-        watch.work += len(q.quads)
         with watch.stage("smooth"):
             guide, report = smooth(start, model)
+        watch.work += report.starts * len(q.quads)
         bad = folded = report.inverted
         steep = np.zeros(0, np.int64)
         if not len(bad):

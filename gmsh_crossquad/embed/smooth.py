@@ -74,12 +74,15 @@ class SmoothReport:
         Untangling rounds.
     start : str
         "placed", "even" or "laplace": the start that led to the result.
+    starts : int
+        Starts that were tried.
     """
 
     min_scaled_jacobian: float
     inverted: Int
     rounds: int
     start: str
+    starts: int
 
 
 def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
@@ -109,7 +112,9 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     tangled = float(np.mean(guide_quality(given, model) <= 0.0))
     order = ("placed", "even", "laplace") if tangled <= TRUSTED else ("even", "placed", "laplace")
     best, quality, chosen, rounds = given, -np.inf, order[0], 0
+    starts = 0
     for name in order:
+        starts += 1
         start = laplace_start(given, model, table) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
         candidate, used, valid = _untangle(start, model, table, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
@@ -120,7 +125,7 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
         if quality > (DOUBTFUL if name == order[0] else 0.0):
             break
     final = guide_quality(best, model)
-    return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen)
+    return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen, starts)
 
 
 def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, float]:
