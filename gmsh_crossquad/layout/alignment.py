@@ -21,6 +21,7 @@ __all__ = ["alignment"]
 STRIP = 4.0
 PRICE = 0.3
 MOST = 40
+MOST_ARCS = 2_000  # beyond, the rows, which are no flow rows, make the program much harder: 66 s were seen
 LEAST = 1.0
 UNLIKE = 1.5
 
@@ -47,7 +48,7 @@ def alignment(tmesh: TMesh, target: Float) -> tuple[sp.csr_array, Float, Float]:
     column: list[int] = []
     value: list[float] = []
     free: list[float] = []
-    for sides in tmesh.patches:
+    for sides in tmesh.patches if len(tmesh.length) <= MOST_ARCS else ():
         length = [float(sum(tmesh.length[arc] for arc, _ in side)) for side in sides]
         for i in (0, 1):
             long, wide = 0.5 * (length[i] + length[i + 2]), 0.5 * (length[i + 1] + length[i - 1])
