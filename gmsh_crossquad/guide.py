@@ -21,7 +21,7 @@ from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
 from .watch import Watch
 
-__all__ = ["GuideResult", "coarse_divisions", "smooth_guide"]
+__all__ = ["GuideResult", "TooManyCells", "coarse_divisions", "smooth_guide"]
 
 # refinements of a layout: twice as many rounds where only a few folded cells are left, no more cells than this factor allows,
 # and only of grids whose scaled Jacobian is worth it
@@ -31,6 +31,10 @@ GROWTH = 3
 WORTH_REFINING = 0.02
 MOST_QUADS = 25_000
 Evaluate = Callable[[int, Float], Float]
+
+
+class TooManyCells(LayoutError):
+    """The guide grid would be too large."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ def smooth_guide(
             if len(q.quads) > min(GROWTH * first, max(first, MOST_QUADS)):
                 break
             if len(q.quads) > MOST_QUADS:
-                raise LayoutError(
+                raise TooManyCells(
                     f"the guide grid would have {len(q.quads)} cells, more than {MOST_QUADS}",
                     remedy="the model has too many short curves or narrow places for its size",
                 )

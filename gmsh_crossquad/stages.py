@@ -22,7 +22,7 @@ from .errors import CrossQuadError, LayoutError, MeshError
 from .field_stage import Rule, Wishes, changes_of, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
-from .guide import GuideResult, coarse_divisions, smooth_guide
+from .guide import GuideResult, TooManyCells, coarse_divisions, smooth_guide
 from .layout.alone import divisible
 from .layout.arc_sizes import arc_sizes
 from .layout.face_tmesh import trace_face
@@ -154,6 +154,8 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
             tried = replace(options, block_size=options.block_size * attempt.blocks)
             tmesh, coarse, result, mesh = _mesh(model, found, tried, BLOCKS / attempt.blocks, attempt.capped, watch)
         except (LayoutError, MeshError) as error:
+            if isinstance(failure, TooManyCells) and isinstance(error, TooManyCells):
+                break
             failure = failure or error
             notes.append(f"another layout was tried, since: {error.what}")
             continue
