@@ -41,7 +41,7 @@ CROWDED = 0.5
 MANY_ARCS = 3_500
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.3
-MOST_WORK = 20_000
+MOST_WORK = 30_000
 
 
 class Attempt(NamedTuple):
@@ -138,6 +138,7 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         wanted = wishes(model, options)
     notes += model.notes
     faces: dict[tuple[float, Rule], _Faces] = {}
+    seen: set[tuple[object, ...]] = set()
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
     before = watch.work
@@ -152,7 +153,10 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
                 faces[key] = _faces(model, finer, wanted, attempt.rule, watch, notes)
             found = faces[key] if attempt.pinned else faces[key].free()
             tried = replace(options, block_size=options.block_size * attempt.blocks)
-            tmesh, coarse, result, mesh = _mesh(model, found, tried, BLOCKS / attempt.blocks, attempt.capped, watch)
+            made = _mesh(model, found, tried, attempt, watch, seen)
+            if made is None:  # the layout of an earlier attempt
+                continue
+            tmesh, coarse, result, mesh = made
         except (LayoutError, MeshError) as error:
             if isinstance(failure, TooManyCells) and isinstance(error, TooManyCells):
                 break
@@ -180,9 +184,10 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
 
 
 def _mesh(
-    model: Model, faces: _Faces, options: MeshOptions, blocks: float, capped: bool, watch: Watch
-) -> tuple[TMesh, Int, GuideResult, QuadMesh]:
-    """Layout, guide grid and final mesh from the faces' T-meshes; `blocks` is the least number across the model."""
+    model: Model, faces: _Faces, options: MeshOptions, attempt: Attempt, watch: Watch, seen: set[tuple[object, ...]]
+) -> tuple[TMesh, Int, GuideResult, QuadMesh] | None:
+    """Layout, guide grid and final mesh from the faces' T-meshes; None if `seen` has the same layout."""
+    which = attempt.background, attempt.rule, attempt.pinned, attempt.capped
     with watch.stage("sizes"):
         sizes = target_sizes(model, faces.meshes, options)
     with watch.stage("glue"):
@@ -191,15 +196,27 @@ def _mesh(
     area = sum(_area(m) for m in faces.meshes)
     guide_size = float(np.sqrt(area / GUIDE_QUADS))
     with watch.stage("quantize"):
-        block = np.maximum(options.block_size * user_size, np.sqrt(area) / blocks)
+        block = np.maximum(options.block_size * user_size, np.sqrt(area) * attempt.blocks / BLOCKS)
         if len(block) > MANY_ARCS:
             block = np.maximum(0.25 * block, user_size)  # the program is much harder where most arcs are shorter than a block
-        coarse = coarse_divisions(model, tmesh, np.where(size < CROWDED * user_size, size, block))
+        wanted = np.where(size < CROWDED * user_size, size, block)
+        if _known((*which, "sizes", wanted.tobytes()), seen):
+            return None
+        coarse = coarse_divisions(model, tmesh, wanted)
+        if _known((*which, "divisions", coarse.tobytes()), seen):
+            return None
     evaluate, vertices = _evaluator(model), vertex_points(model)
-    result = smooth_guide(model, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, capped)
+    result = smooth_guide(model, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
     with watch.stage("fill"):
         mesh = fill(model, result.guide, result.fine, evaluate, vertices)
     return tmesh, coarse, result, mesh
+
+
+def _known(key: tuple[object, ...], seen: set[tuple[object, ...]]) -> bool:
+    """Whether `seen` has the key, which it has afterwards."""
+    known = key in seen
+    seen.add(key)
+    return known
 
 
 def _evaluator(model: Model) -> Callable[[int, Float], Float]:

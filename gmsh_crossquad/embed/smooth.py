@@ -47,8 +47,8 @@ SHARPENING = (12, 6)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
 WANTED = 0.85
 POOR = 0.15
-LOSS = 0.02
-"""A sharpened grid is taken if the least scaled Jacobian was below `POOR`, or if the mean one falls by less than `LOSS`:
+WORTH = 4.0
+"""A sharpened grid is taken if the least scaled Jacobian was below `POOR`, or rises by `WORTH` times what the mean one falls:
 where the worst corners cannot become good (one block at a straight angle), a high power spoils all others for them."""
 LEAST_AREA = 1e-3
 LEAST_EPS = 1e-4
@@ -145,7 +145,7 @@ def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths
         sharp = _polish(best, model, table, rest, *SHARPENING, barrier=True)
         before, after = guide_quality(best, model), guide_quality(sharp, model)
         score = float(after.min())
-        if score > quality and (quality < POOR or before.mean() - after.mean() < LOSS):
+        if score > quality and (quality < POOR or score - quality > WORTH * (before.mean() - after.mean())):
             best, quality = sharp, score
     return best, quality
 
