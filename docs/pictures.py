@@ -10,6 +10,7 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+from PIL import Image
 
 HERE = Path(__file__).resolve().parent
 GEO = HERE.parent / "geo"
@@ -35,6 +36,14 @@ def stress(path: Path, ratio: float = 0.5) -> None:
     quads = np.stack([node[:-1], node[1:], after[1:], after[:-1]], axis=-1).reshape(-1, 4)
     tensor = np.stack([xx.ravel(), yy.ravel(), zero, xy.ravel(), zero, zero], axis=1)
     meshio.Mesh(points, [("quad", quads)], point_data={"stress": tensor}).write(path)
+
+
+def shrink(path: Path, width: int = 1600, colours: int = 64) -> None:
+    """Make a picture small enough for a repository."""
+    with Image.open(path) as picture:
+        size = width, round(picture.height * width / picture.width)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(colours)
+    small.save(path, optimize=True)
 
 
 def main() -> None:
@@ -64,6 +73,7 @@ def main() -> None:
             command += ["--index", "1=-1/4"] if name == "function" else []
             command += ["--picture", str(HERE / f"field_{name}.png")] + ([] if size is None else ["--size", str(size)])
             print(subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
+            shrink(HERE / f"field_{name}.png")
 
 
 if __name__ == "__main__":
