@@ -80,7 +80,7 @@ def _parser() -> argparse.ArgumentParser:
             "--relax",
             action=argparse.BooleanOptionalAction,
             default=None,
-            help="move singular points so that the flux around holes vanishes (default: only if there is no layout otherwise)",
+            help="move singular points so that the flux around holes vanishes (default: only if nothing else gives a layout)",
         )
 
     check = commands.add_parser(

@@ -35,7 +35,7 @@ class MeshOptions:
         Change as few indices as possible where they do not fit together, instead of an error.
     relax : bool or None
         Move singular points that the user set: always, so that the flux around holes vanishes; never; None: only if there is no
-        layout otherwise.
+        layout otherwise, not even with a pair of singularities added.
     """
 
     size: float | None = None

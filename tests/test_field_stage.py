@@ -185,3 +185,36 @@ def test_an_index_at_a_point_with_two_sectors_is_refused():
     gmsh.model.mesh.embed(1, crack, 2, surface)
     with pytest.raises(CrossQuadError, match="an index is set at a point where the surface has 2 sectors, point 50 at"):
         face_fields(MeshOptions(boundary_index={50: "1/4"}))
+
+
+def ring():
+    occ = gmsh.model.occ
+    occ.cut([(2, occ.addDisk(0, 0, 0, 1, 1))], [(2, occ.addDisk(0.2, 0, 0, 0.4, 0.4))])
+    occ.synchronize()
+
+
+PAIR = Singularities([(-0.6, 0.4), (-0.5, -0.4)], [1, -1])
+
+
+def test_relaxed_singularities_have_no_flux_around_holes():
+    ring()
+    _, _, (as_given,), _ = face_fields(MeshOptions(field=PAIR))
+    _, (mesh,), (relaxed,), notes = face_fields(MeshOptions(field=PAIR, relax=True))
+    assert abs(as_given.flux[1]) > 1.0
+    assert abs(relaxed.flux[1]) < 0.01
+    assert inside(mesh, relaxed) == [-1, 1]
+    assert len(notes) == 1 and "singularities of surface 1 were moved, by up to" in notes[0]
+    assert len(relaxed.moved) == 2
+    turn = relaxed.given.theta + relaxed.phi + relaxed.psi - relaxed.field.theta
+    assert np.abs(turn - np.pi / 2 * np.rint(turn / (np.pi / 2))).max() < 1e-9
+
+
+def test_a_field_with_flux_gets_a_pair_or_moves():
+    ring()
+    result = block_mesh(MeshOptions(field=PAIR, size=0.08))
+    assert sum("was added at" in note for note in result.notes) == 2
+    (aligned,), (mesh,) = result.fields, result.meshes
+    assert inside(mesh, aligned) == [-1, -1, 1, 1]
+    assert len(aligned.added) == 2
+    relaxed = block_mesh(MeshOptions(field=PAIR, size=0.08, relax=True))
+    assert inside(relaxed.meshes[0], relaxed.fields[0]) == [-1, 1]
