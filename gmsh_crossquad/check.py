@@ -5,13 +5,13 @@ vertices (valence not 4, off the free boundary and off all line elements), and c
 have nodes of other single-cell edges in its inside (a hanging node), nor lie on another such edge (a crack), unless both are
 on curves of the model that bound one surface: that crack was drawn.
 
-`compare` goes on with the model.
+`compare` goes on with the model; `judge` is the command.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +20,9 @@ from .quality import twins
 from .records import Float, Int
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from .cad.files import MeshArrays
 
-__all__ = ["TOUCH", "Report", "check_mesh", "check_task", "format_report", "free_edges"]
+__all__ = ["TOUCH", "Report", "check_mesh", "format_report", "free_edges"]
 
 TOUCH = 1e-6
 """Distance over the mesh's diagonal below which two places are the same."""
@@ -233,24 +231,3 @@ def format_report(report: Report, name: str) -> str:
     lines = [name, *(f"  {label:<22} {value}" for label, value in rows)]
     lines.append("ok" if not report.faults else "fails: " + "; ".join(report.faults))
     return "\n".join(lines)
-
-
-def check_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
-    """The work of ``gmsh-crossquad check``, in the child process: the table as text, and the faults."""
-    from .cad.files import open_model, physical_groups, read_mesh
-    from .cad.session import guest
-
-    with guest():
-        emit("open the mesh")
-        open_model(job["mesh"])
-        mesh = read_mesh()
-        report = check_mesh(mesh)
-        if job["model"]:
-            from .cad.read import read_model
-            from .compare import compare
-            from .options import MeshOptions
-
-            emit("open the model")
-            open_model(job["model"])
-            report = compare(report, mesh, read_model(MeshOptions()), physical_groups())
-    return {"table": format_report(report, job["mesh"]), "faults": list(report.faults)}

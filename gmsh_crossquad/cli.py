@@ -330,7 +330,7 @@ def _check(arguments: argparse.Namespace) -> int:
     if arguments.model:
         check_input(arguments.model)
     job = {"mesh": arguments.mesh, "model": arguments.model, "verbose": arguments.verbose}
-    answer = run("check:check_task", job, _display(arguments))
+    answer = run("judge:check_task", job, _display(arguments))
     if not arguments.quiet:
         print(answer["table"])
     return 1 if answer["faults"] else 0

@@ -55,6 +55,11 @@ class MeshResult:
         """The nodes and quads."""
         return self.stages.mesh
 
+    @property
+    def face_tags(self) -> tuple[int, ...]:
+        """Gmsh tags of the faces, by row of the model's faces."""
+        return tuple(face.tag for face in self.stages.model.faces)
+
     @cached_property
     def normals(self) -> Float:
         """(f, 3) unit normal of every face, by row of the model's faces."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..face_field import FaceField
-    from ..result import MeshResult
+    from .subject import Subject
 
 __all__ = ["draw_scene", "field_picture", "picture"]
 
@@ -28,12 +28,12 @@ _PATIENCE = 120.0
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
-def picture(result: MeshResult, path: str | os.PathLike[str]) -> None:
+def picture(result: Subject, path: str | os.PathLike[str]) -> None:
     """Draw a result into a PNG file.
 
     Parameters
     ----------
-    result : MeshResult
+    result : Subject
     path : path
         A `.png` file; it appears only when it is complete.
 

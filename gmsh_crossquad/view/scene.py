@@ -21,7 +21,7 @@ from ..records import Float, Int
 if TYPE_CHECKING:
     from ..block_layout import Layout
     from ..face_field import FaceField
-    from ..result import MeshResult
+    from .subject import Subject
 
 __all__ = ["Lines", "Markers", "Panel", "Scene", "build_field_scene", "build_scene"]
 
@@ -171,12 +171,12 @@ def _count(n: int, what: str) -> str:
     return f"{n:,} {what}" + ("" if n == 1 else "s")
 
 
-def build_scene(result: MeshResult) -> Scene:
+def build_scene(result: Subject) -> Scene:
     """The three panels of a result: cross field, block layout, mesh.
 
     Parameters
     ----------
-    result : MeshResult
+    result : Subject
 
     Returns
     -------

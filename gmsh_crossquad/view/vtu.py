@@ -26,7 +26,7 @@ from ..records import Float, Int
 
 if TYPE_CHECKING:
     from ..face_field import FaceField
-    from ..result import MeshResult
+    from .subject import Subject
 
 __all__ = ["write_vtu"]
 
@@ -44,12 +44,12 @@ def _triangle_crosses(f: FaceField) -> Float:
     return np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
 
 
-def write_vtu(result: MeshResult, path: str | os.PathLike[str]) -> None:
+def write_vtu(result: Subject, path: str | os.PathLike[str]) -> None:
     """Write a result for ParaView.
 
     Parameters
     ----------
-    result : MeshResult
+    result : Subject
     path : path
         A `.vtu` file; it appears only when it is complete.
 
@@ -66,7 +66,7 @@ def write_vtu(result: MeshResult, path: str | os.PathLike[str]) -> None:
     points: list[Float] = [mesh.points]
     cells: list[tuple[str, Int]] = []
     rows: list[dict[str, object]] = []
-    tags = np.array([face.tag for face in result.stages.model.faces])
+    tags = np.array(result.face_tags)
 
     def add(kind: str, connectivity: Int, **values: object) -> None:
         if len(connectivity):

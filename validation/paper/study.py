@@ -17,9 +17,9 @@ from separatrices import Complex, Parts, Power, interpolated, parts
 import gmsh_crossquad as cq
 from gmsh_crossquad.cad.files import open_model, write_mesh
 from gmsh_crossquad.cad.session import guest
-from gmsh_crossquad.check import check_task
 from gmsh_crossquad.field.compatibility import quarter_text
 from gmsh_crossquad.field.surface_mesh import SurfaceMesh
+from gmsh_crossquad.judge import check_task
 from gmsh_crossquad.quality import twins
 
 HERE = Path(__file__).resolve().parent
