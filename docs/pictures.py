@@ -1,4 +1,4 @@
-"""Makes the pictures of the README, one for each source of cross fields.
+"""Makes the pictures of the README: a mesh, and one for each source of cross fields.
 
 python docs/pictures.py
 """
@@ -38,9 +38,10 @@ def stress(path: Path, ratio: float = 0.5) -> None:
     meshio.Mesh(points, [("quad", quads)], point_data={"stress": tensor}).write(path)
 
 
-def shrink(path: Path, width: int = 1600, colours: int = 64) -> None:
+def shrink(path: Path, width: int = 1500, colours: int = 64) -> None:
     """Make a picture small enough for a repository."""
     with Image.open(path) as picture:
+        width = min(width, picture.width)
         size = width, round(picture.height * width / picture.width)
         small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(colours)
     small.save(path, optimize=True)
@@ -53,27 +54,18 @@ def main() -> None:
         (Path(folder) / "own.py").write_text(
             "import numpy as np\n\n\ndef star(p):\n    return np.angle((p[:, 0] + 1j * p[:, 1]) ** 5 - 0.1) / 4\n"
         )
-        for name, model, size, field in (
-            ("singularities", "disc", 0.08, "singularities:(-0.4,0):1,(0.4,0):1"),
-            ("eigenmode", "naca0012", None, "eigenmode:4"),
-            ("file", "plate_hole", 0.08, "stress.vtu:principal"),
-            ("function", "circle", 0.08, "own:star"),
+        for name, model, *options in (
+            ("plate_two_holes", "plate_two_holes", "--size", "0.05"),
+            ("field_singularities", "disc", "--size", "0.08", "--field", "singularities:(-0.4,0):1,(0.4,0):1"),
+            ("field_eigenmode", "naca0012", "--field", "eigenmode:4"),
+            ("field_file", "plate_hole", "--size", "0.08", "--field", "stress.vtu:principal"),
+            ("field_function", "circle", "--size", "0.08", "--field", "own:star", "--index", "1=-1/4"),
         ):
-            command = [
-                sys.executable,
-                "-m",
-                "gmsh_crossquad",
-                "mesh",
-                str(GEO / f"{model}.geo"),
-                "-o",
-                "out.msh",
-                "--field",
-                field,
-            ]
-            command += ["--index", "1=-1/4"] if name == "function" else []
-            command += ["--picture", str(HERE / f"field_{name}.png")] + ([] if size is None else ["--size", str(size)])
+            picture = HERE / f"{name}.png"
+            command = [sys.executable, "-m", "gmsh_crossquad", "mesh", str(GEO / f"{model}.geo"), "-o", "out.msh", *options]
+            command += ["--picture", str(picture)]
             print(subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
-            shrink(HERE / f"field_{name}.png")
+            shrink(picture)
 
 
 if __name__ == "__main__":
