@@ -34,12 +34,22 @@ def test_draws_are_what_they_should_be(seed):
 
 
 @pytest.mark.parametrize("family", range(10))
-@given(st.integers(0, 1_000))
-@settings(max_examples=3, deadline=None, derandomize=True)
-def test_a_random_draw_is_aligned_as_asked_and_meshed(family, number):
-    found = outcome(10 * number + family)
-    assert found.aligned
-    assert found.quality > 0 or (found.error and "\n" not in found.error)
+def test_random_draws_are_aligned_as_asked_and_meshed(family):
+    errors = []
+
+    @given(st.integers(0, 1_000))
+    @settings(max_examples=20, deadline=None, derandomize=True)
+    def draws(number):
+        found = outcome(10 * number + family)
+        assert found.aligned
+        if found.error:
+            assert "\n" not in found.error
+            errors.append(found)
+        else:
+            assert found.quality > 0
+
+    draws()
+    assert len(errors) <= 1  # 20 draws of each of 10 families: at least 97 % of all, measured 100 %
 
 
 @pytest.mark.parametrize("seed", [45, 104])
