@@ -56,6 +56,11 @@ class Wishes:
     fix: bool = False
 
     @property
+    def pinned(self) -> bool:
+        """Whether any singular point must keep its place."""
+        return any(len(points) for points in self.seeds)
+
+    @property
     def given(self) -> bool:
         """Whether any face has another field than the default."""
         return any(not isinstance(source, Smooth) for source in self.sources)
@@ -108,7 +113,9 @@ def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
     return EdgeFrames(face.tag, surface, model.origin + model.scale * face.world(mesh.points), normal)
 
 
-def field_of_face(model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "keep") -> tuple[AlignedField, list[str]]:
+def field_of_face(
+    model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "keep", split: bool = True
+) -> tuple[AlignedField, list[str]]:
     """The aligned field of one face, and notes on what was changed.
 
     Parameters
@@ -116,9 +123,12 @@ def field_of_face(model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "ke
     model : Model
     mesh : FaceMesh
     wanted : Wishes
-    rule : {"keep", "harmonic", "relaxed"}
+    rule : {"keep", "harmonic", "relaxed", "divisible"}
         What is done with a given field: it is rotated as little as possible; replaced by the harmonic field with the same
-        singularities; and these are moved, too, so that the flux around holes vanishes.
+        singularities; and these are moved, too, so that the flux around holes vanishes.  "divisible" is "harmonic" here, and
+        changed later where it has no layout.
+    split : bool
+        Share indices of 1/2 and more among several points, as a mesh needs it.
 
     Raises
     ------
@@ -141,13 +151,17 @@ def field_of_face(model: Model, mesh: FaceMesh, wanted: Wishes, rule: Rule = "ke
             index,
             keep=rule == "keep",
             relax=rule == "relaxed",
+            split=split,
             fix=wanted.fix,
             prescribed=chosen,
             epsilon=epsilon,
         )
     except Incompatible as error:
         raise _named(model, mesh, error.misfit) from None
-    return aligned, changes_of(model, mesh, index, aligned)
+    notes = changes_of(model, mesh, index, aligned)
+    if rule != "keep" and not isinstance(source, (Smooth, Singularities)):  # those are harmonic
+        notes.append(f"the given field of surface {model.faces[mesh.face].tag} was smoothed, its singularities kept")
+    return aligned, notes
 
 
 def _boundary(model: Model, mesh: FaceMesh, wanted: Wishes) -> tuple[Int, Bool]:

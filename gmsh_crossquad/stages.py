@@ -235,7 +235,7 @@ def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:
         return ATTEMPTS
     if options.relax:
         return (*(a._replace(rule="relaxed") for a in ATTEMPTS), Attempt(rule="divisible"))
-    return tuple(a for a in GIVEN_ATTEMPTS if a.pinned or options.relax is None)
+    return tuple(a for a in GIVEN_ATTEMPTS if a.pinned or (options.relax is None and wanted.pinned))
 
 
 def face_fields(options: MeshOptions, watch: Watch | None = None) -> tuple[Model, list[FaceMesh], list[AlignedField], list[str]]:
@@ -259,7 +259,7 @@ def face_fields(options: MeshOptions, watch: Watch | None = None) -> tuple[Model
 
     def work(mesh: FaceMesh) -> tuple[FaceMesh, AlignedField, list[str]]:
         with watch.stage("field"):
-            return mesh, *field_of_face(model, mesh, wanted, "relaxed" if options.relax else "keep")
+            return mesh, *field_of_face(model, mesh, wanted, "relaxed" if options.relax else "keep", split=False)
 
     parts = _on_all_faces(model, options, wanted, watch, notes, work)
     return model, [p[0] for p in parts], [p[1] for p in parts], notes + [note for p in parts for note in p[2]]

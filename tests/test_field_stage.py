@@ -4,11 +4,13 @@ import gmsh
 import numpy as np
 import pytest
 
+from gmsh_crossquad.cad.background import background_meshes
 from gmsh_crossquad.cad.read import read_model
 from gmsh_crossquad.errors import CrossQuadError, FieldError
-from gmsh_crossquad.field_stage import wishes
+from gmsh_crossquad.field_stage import field_of_face, wishes
 from gmsh_crossquad.options import MeshOptions
 from gmsh_crossquad.source.formula import Singularities
+from gmsh_crossquad.source.function import Function
 from gmsh_crossquad.source.per_face import PerFace
 from gmsh_crossquad.stages import block_mesh, face_fields
 
@@ -218,3 +220,25 @@ def test_a_field_with_flux_gets_a_pair_or_moves():
     assert len(aligned.added) == 2
     relaxed = block_mesh(MeshOptions(field=PAIR, size=0.08, relax=True))
     assert inside(relaxed.meshes[0], relaxed.fields[0]) == [-1, 1]
+
+
+def test_a_field_that_is_not_kept_is_told():
+    round_plate(4)
+    model = read_model(MeshOptions())
+    source = Function(lambda p: np.angle((p[:, 0] + 1j * p[:, 1]) ** 4 - 0.1) / 4)
+    wanted = wishes(model, MeshOptions(field=source))
+    (mesh,) = background_meshes(model, MeshOptions(), wanted.seeds)
+    assert field_of_face(model, mesh, wanted)[1] == []
+    assert field_of_face(model, mesh, wanted, "divisible")[1] == [
+        "the given field of surface 1 was smoothed, its singularities kept"
+    ]
+
+
+def test_strong_singularities_are_split_for_a_mesh_only():
+    round_plate(4)
+    options = MeshOptions(field=Singularities([(0.1, 0.0)], [4]), size=0.15)
+    _, (mesh,), (aligned,), notes = face_fields(options)
+    assert inside(mesh, aligned) == [4] and notes == []
+    result = block_mesh(options)
+    assert inside(result.meshes[0], result.fields[0]) == [1, 1, 1, 1]
+    assert any("was split into 4 of +1/4" in note for note in result.notes)

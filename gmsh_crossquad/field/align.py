@@ -21,7 +21,7 @@ carries the cocycles, its period around hole i is ``+ (pi/2) D_i``; phi is harmo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,7 +42,7 @@ from .singularities import (
 from .smooth import wrap
 from .surface_mesh import SurfaceMesh
 
-__all__ = ["Aligner", "Rotated", "align", "closest"]
+__all__ = ["Aligner", "Rotated", "align", "closest", "with_parts"]
 
 _TOLERANCE = 1e-6
 
@@ -225,6 +225,14 @@ def closest(energy: Float, right: Float) -> Int:
         m[i] += step
         slope += step * energy[:, i]
     return m
+
+
+def with_parts(operators: FieldOperators, aligned: AlignedField, given: CrossField) -> AlignedField:
+    """`aligned` with `given` and the phi and psi that lead from it, also where singularities have moved."""
+    x = wrap(aligned.field.theta - given.theta)
+    turn = aligned.field.rotation - given.rotation - operators.difference(x)
+    psi = operators.solve(np.zeros(len(x)), QUARTER * np.rint(turn / QUARTER))
+    return replace(aligned, given=given, phi=x - psi, psi=psi)
 
 
 def align(

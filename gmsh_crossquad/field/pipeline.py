@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..records import AlignedField, Bool, CrossField, FaceMesh, Float, Int
-from .align import Aligner, align
+from .align import Aligner, align, with_parts
 from .boundary import correct_boundary
 from .cancel import cancel_pairs
 from .clearance import Clearance
@@ -16,8 +16,8 @@ from .corners import boundary_indices
 from .flux import vanish_flux
 from .operators import FieldOperators
 from .relax import leave_corners, relax_singularities
-from .singularities import QUARTER, singular_vertices, snap_to_vertices
-from .smooth import smooth_field, wrap
+from .singularities import singular_vertices, snap_to_vertices
+from .smooth import smooth_field
 from .strong import split_strong
 from .surface_mesh import SurfaceMesh
 
@@ -32,6 +32,7 @@ def aligned_field(
     keep: bool = True,
     relax: bool = False,
     fix: bool = False,
+    split: bool = True,
     prescribed: Bool | None = None,
     epsilon: float | None = None,
 ) -> AlignedField:
@@ -51,6 +52,8 @@ def aligned_field(
         Move the singularities of a given field until the flux around every hole vanishes; the field becomes harmonic.
     fix : bool
         Where the singularities of a given field do not fit the boundary indices, change as few as possible (see `compatibility`).
+    split : bool
+        Share indices of 1/2 and more of a given field among several points, as a mesh needs it (see `strong`).
     prescribed : (n,) bool, optional
         Boundary vertices whose index the user chose, which `fix` may change.
     epsilon : float, optional
@@ -70,7 +73,7 @@ def aligned_field(
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
     if field is not None:
-        return _given(surface, operators, mesh, field, wanted, keep and not relax, relax, fix, prescribed)
+        return _given(surface, operators, mesh, field, wanted, keep and not relax, relax, fix, split, prescribed)
     aligner = Aligner(surface, operators, wanted)
     smooth = smooth_field(surface, operators, epsilon)
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
@@ -92,6 +95,7 @@ def _given(
     keep: bool,
     relax: bool,
     fix: bool,
+    split: bool,
     prescribed: Bool | None,
 ) -> AlignedField:
     """Align a given field: its indices onto vertices, checked against the boundary's, then one solve."""
@@ -110,13 +114,15 @@ def _given(
             clearance = Clearance(surface, [])
             rotation, new = add_singularities(surface, clearance, rotation, misfit)
             added += new
-    rotation, split = split_strong(surface, Clearance(surface, []), rotation, mesh.port)
+    shared: tuple[tuple[int, int], ...] = ()
+    if split:
+        rotation, shared = split_strong(surface, Clearance(surface, []), rotation, mesh.port)
     start = CrossField(field.theta, rotation)
     if relax:
         aligned = _relaxed(Aligner(surface, operators, wanted), mesh, start, field)
     else:
         aligned = replace(align(surface, operators, start, wanted, field if keep else None), given=field)
-    return replace(aligned, added=tuple(added), split=split)
+    return replace(aligned, added=tuple(added), split=shared)
 
 
 def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossField) -> AlignedField:
@@ -125,10 +131,7 @@ def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossFi
     moved = vanish_flux(aligner, clearance, aligner.rotate(start).field, [], mesh.port)
     aligned = aligner.finish(aligner.rotate(moved.field), moved.field)
     steps = tuple((int(a), int(b)) for a, b in zip(moved.start, moved.end, strict=True) if a != b)
-    x = wrap(aligned.field.theta - given.theta)
-    turn = aligned.field.rotation - given.rotation - aligner.operators.difference(x)
-    psi = aligner.operators.solve(np.zeros(len(x)), QUARTER * np.rint(turn / QUARTER))
-    return replace(aligned, given=given, phi=x - psi, psi=psi, moved=steps)
+    return replace(with_parts(aligner.operators, aligned, given), moved=steps)
 
 
 def _interior(surface: SurfaceMesh, rotation: Float) -> Int:

@@ -19,13 +19,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..records import AlignedField, CrossField, FaceMesh, Int
-from .align import Aligner
+from .align import Aligner, with_parts
 from .clearance import Clearance
 from .flux import vanish_flux
 from .operators import FieldOperators
 from .pair import add_pair
-from .singularities import QUARTER, singular_vertices
-from .smooth import wrap
+from .singularities import singular_vertices
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["alternatives"]
@@ -81,16 +80,9 @@ def _finished(
     aligner: Aligner, field: CrossField, before: AlignedField, added: Int | None = None, moved: Int | None = None
 ) -> AlignedField:
     """The checked field, and what turned the field that was given at first."""
-    aligned = aligner.finish(aligner.rotate(field), field)
-    given = before.given
-    x = wrap(aligned.field.theta - given.theta)
-    turn = aligned.field.rotation - given.rotation - aligner.operators.difference(x)
-    psi = aligner.operators.solve(np.zeros(len(x)), QUARTER * np.rint(turn / QUARTER))
+    aligned = with_parts(aligner.operators, aligner.finish(aligner.rotate(field), field), before.given)
     return replace(
         aligned,
-        given=given,
-        phi=x - psi,
-        psi=psi,
         split=before.split,
         added=before.added if added is None else (*before.added, *added.tolist()),
         moved=before.moved if moved is None else (*before.moved, *map(tuple, moved.tolist())),
