@@ -82,15 +82,20 @@ class Curve:
 
 @dataclass(frozen=True)
 class Face:
-    """A planar CAD face.
+    """A CAD face, plane or curved.
+
+    Local coordinates ``(x - origin) @ axes.T`` of a plane face are those in its plane; of a curved one they are the scaled
+    coordinates themselves.
 
     Attributes
     ----------
     tag : int
-    origin : (3,) float64, scaled; axes : (2, 3) float64
-        Orthonormal frame; ``cross(axes[0], axes[1])`` is the CAD normal.  Local coordinates are ``(x - origin) @ axes.T``.
+    origin : (3,) float64, scaled; axes : (2, 3) or (3, 3) float64
+        Of a plane face an orthonormal frame; ``cross(axes[0], axes[1])`` is the CAD normal.  Of a curved one 0 and the
+        identity.
     loops : tuple of loops, each a tuple of (curve row, +1 or -1)
-        Outer loop first and counter-clockwise in the local frame, holes clockwise: the face is on the left.
+        Of a plane face the outer loop first and counter-clockwise in the local frame, holes clockwise: the face is on the
+        left.  Of a curved face in any order and direction; none where it is closed.
     embedded_curves : tuple of int
         Rows of `Model.curves` that lie inside the face (cracks, embedded lines).
     embedded_points : tuple of int
@@ -104,13 +109,25 @@ class Face:
     embedded_curves: tuple[int, ...] = ()
     embedded_points: tuple[int, ...] = ()
 
+    @property
+    def curved(self) -> bool:
+        """Whether the face is not known to be plane."""
+        return len(self.axes) == 3
+
+    @property
+    def normal(self) -> Float:
+        """Unit normal (3,) of a plane face."""
+        assert not self.curved
+        out: Float = np.cross(self.axes[0], self.axes[1])
+        return out
+
     def local(self, points: Float) -> Float:
-        """Local coordinates (n, 2) of scaled points (n, 3)."""
+        """Local coordinates (n, 2) or (n, 3) of scaled points (n, 3)."""
         out: Float = (np.asarray(points) - self.origin) @ self.axes.T
         return out
 
     def world(self, points: Float) -> Float:
-        """Scaled points (n, 3) of local coordinates (n, 2)."""
+        """Scaled points (n, 3) of local coordinates (n, 2) or (n, 3)."""
         out: Float = self.origin + np.asarray(points) @ self.axes
         return out
 
@@ -163,8 +180,8 @@ class FaceMesh:
     ----------
     face : int
         Row of `Model.faces`.
-    points : (n, 2) float64
-        Local coordinates.  A point on an embedded curve appears once per side.
+    points : (n, 2) or (n, 3) float64
+        Local coordinates of a plane or of a curved face.  A point on an embedded curve appears once per side.
     triangles : (m, 3) int64
         Counter-clockwise.
     boundary : (b, 2) int64
@@ -182,6 +199,9 @@ class FaceMesh:
         True where the layout must have a block corner although the field is regular there.
     seed : (n,) int64
         Row of the points that were asked to be vertices of the face, or -1; all -1 where it is left out.
+    parameters : (n, 2) float64
+        CAD parameters (u, v) of the points on a curved face, NaN where the CAD gives none; on a seam those of one side.
+        Empty (0, 2) on plane faces.
     """
 
     face: int
@@ -194,6 +214,7 @@ class FaceMesh:
     opening_angle: Float
     port: Bool
     seed: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    parameters: Float = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         if not len(self.seed):
@@ -265,7 +286,7 @@ class FaceTMesh:
     Attributes
     ----------
     face : int
-    position : (n, 2) float64
+    position : (n, 2) or (n, 3) float64
         Local coordinates of the nodes.
     vertex : (n,) int64
         Background vertex of a node (singularities, corners, ports), -1 at T-junctions and ends of traces.
@@ -279,7 +300,7 @@ class FaceTMesh:
     arcs : (a, 2) int64
         Start and end node; boundary arcs run with the face on the left.
     length : (a,) float64
-    polyline : tuple of (k, 2) float64
+    polyline : tuple of (k, 2) or (k, 3) float64
         Local coordinates from start to end.
     loop : (a,) int64
         Boundary loop of a boundary arc, -1 for a trace.
@@ -369,7 +390,7 @@ class Guide:
     cad_vertex : (n,) int64
         Row of `Model.vertices` or -1.
     quads : (q, 4) int64
-        Counter-clockwise in the frame of their face.
+        Counter-clockwise as seen from the side of their face's normal.
     quad_face : (q,) int64
     quad_block : (q,) int64
         Coarse block (unit cell of the conforming layout) that the quad belongs to.
