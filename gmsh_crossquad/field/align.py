@@ -10,7 +10,8 @@ the field does:
 2. x is then known on every boundary edge up to one constant per loop, a multiple ``m_i pi/2`` (0 on the outer loop), and
    inside it minimises ``1/2 sum w (difference(x) + r)^2``.  With r = the rotation of the given field and the cocycles the
    result is harmonic: the smoothest field with these singularities.  With r = the cocycles alone x is the least rotation, and
-   the given field is kept: one that is aligned already comes out as it went in.
+   the given field is kept: one that is aligned already comes out as it went in.  A component without boundary has no
+   condition; on a surface of any genus x is single-valued, so that the field keeps its homotopy class.
 3. The integers m minimise the same energy, ``1/2 (pi/2)^2 m'Am + (pi/2) g.m`` with ``A_ij = int grad a_i . grad a_j`` for a_i
    harmonic, 1 on loop i and 0 on the others, and g the flux with m = 0: the rounded real minimum, then single steps while
    they help.
@@ -117,7 +118,7 @@ class Aligner:
             "the degree of the cross field along a boundary loop",
             np.array([self.mesh.points[p.vertices[0]] for p in self.loops]),
         )
-        components = np.array([loop.component for loop in self.loops])
+        components = np.array([loop.component for loop in self.loops], np.int64)
         total = np.bincount(components, defect)
         if np.any(total != 0):
             raise LayoutError(
@@ -195,7 +196,7 @@ class Aligner:
         mesh, field = self.mesh, rotated.field
         index = to_integer(vertex_index(mesh, field.rotation), "the index of a vertex", mesh.points)
         wrong = np.flatnonzero(mesh.boundary_vertex & (index != self.boundary_index))
-        residual = float(np.abs(wrap(field.theta[self.operators.fixed])).max())
+        residual = float(np.abs(wrap(field.theta[self.operators.fixed])).max(initial=0.0))
         angle = field.theta[mesh.triangle_edges] + mesh.edge_direction
         drift = float(np.abs(wrap(np.roll(angle, -1, axis=1) - angle - field.rotation)).max())
         if len(wrong) or residual > _TOLERANCE or drift > _TOLERANCE or np.any(triangle_index(field.rotation)):

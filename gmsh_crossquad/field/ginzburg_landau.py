@@ -16,10 +16,10 @@ turns and lengths of z apart, there were more.  With a core below the mesh size 
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..records import Float
-from .operators import FieldOperators, factor
+from .connection import ConnectionOperators
+from .operators import FieldOperators
 from .surface_mesh import SurfaceMesh
 
 __all__ = ["minimise_energy"]
@@ -29,14 +29,16 @@ _STEPS = 300
 _TOLERANCE = 1e-13
 
 
-def minimise_energy(mesh: SurfaceMesh, operators: FieldOperators, start: Float, epsilon: float) -> tuple[Float, list[float]]:
+def minimise_energy(
+    mesh: SurfaceMesh, operators: FieldOperators | ConnectionOperators, start: Float, epsilon: float
+) -> tuple[Float, list[float]]:
     """The field of least energy near `start`.
 
     Parameters
     ----------
     mesh : SurfaceMesh
-    operators : FieldOperators
-        Of the same mesh.
+    operators : FieldOperators or ConnectionOperators
+        Of the same mesh; they say in which frames z is: a global one, or that of every edge.
     start : (e, 2) float64
         Real and imaginary part of z; its values on the boundary are kept.
     epsilon : float
@@ -49,13 +51,13 @@ def minimise_energy(mesh: SurfaceMesh, operators: FieldOperators, start: Float, 
     list of float
         Energy before every step and after the last.
     """
-    stiffness, free = operators.stiffness, operators.free
+    free = operators.free
     mass = np.bincount(mesh.triangle_edges.ravel(), np.repeat(mesh.area / 3, 3), len(mesh.edges)).astype(np.float64)
     penalty = mass / epsilon**2
-    lu = factor((operators.inner + sp.diags(penalty[free])).tocsc())
+    lu = operators.shifted(penalty[free])
     z = start.copy()
     excess = np.sum(z * z, axis=1) - 1.0
-    applied = stiffness @ z
+    applied = operators.apply(z)
     energies = [0.5 * float(np.sum(z * applied)) + 0.25 * float(penalty @ excess**2)]
     direction = np.zeros_like(z)
     last_gradient, last_slope = np.zeros((len(free), 2)), 0.0
@@ -70,7 +72,7 @@ def minimise_energy(mesh: SurfaceMesh, operators: FieldOperators, start: Float, 
         if np.sum(gradient * direction[free]) >= 0.0:
             direction[free] = -steepest
         last_gradient, last_slope = gradient, slope
-        bent = stiffness @ direction
+        bent = operators.apply(direction)
         cross, length = np.sum(z * direction, axis=1), np.sum(direction * direction, axis=1)
         line = np.array(
             [

@@ -2,9 +2,10 @@
 
 One unknown per edge; in a triangle the unknowns of edges k and k + 1 meet at vertex k + 1 with weight ``2 cot(angle there)``, so
 that ``1/2 sum w (x_{k+1} - x_k)^2`` is exactly the Dirichlet energy of the piecewise linear (per triangle) function.  Values on
-boundary edges are prescribed.  Every problem of the field stage is one of
+boundary edges are prescribed; in a component without boundary, where only a constant is free, x is 0 on its first edge.  Every
+problem of the field stage is one of
 
-    min over x of 1/2 sum over corners of w (x_{k+1} - x_k + r)^2,    x given on the boundary,
+    min over x of 1/2 sum over corners of w (x_{k+1} - x_k + r)^2,    x given on those edges,
 
 with one and the same symmetric positive definite matrix.
 """
@@ -37,7 +38,6 @@ class FieldOperators:
     Parameters
     ----------
     mesh : SurfaceMesh
-        With a boundary in every component.
     """
 
     mesh: SurfaceMesh
@@ -49,8 +49,13 @@ class FieldOperators:
 
     @cached_property
     def free(self) -> Int:
-        """Interior edges."""
-        return np.flatnonzero(~self.mesh.boundary_edge)
+        """Interior edges, but for one of every component without boundary."""
+        unknown = ~self.mesh.boundary_edge
+        closed = self.mesh.component_closed
+        if np.any(closed):
+            part = self.mesh.components[self.mesh.edges[:, 0]]
+            unknown[np.unique(part, return_index=True)[1][closed]] = False
+        return np.flatnonzero(unknown)
 
     @cached_property
     def fixed(self) -> Int:
@@ -68,17 +73,31 @@ class FieldOperators:
 
     @cached_property
     def inner(self) -> sp.csc_matrix:
-        """The stiffness among interior edges."""
+        """The stiffness among the free edges."""
         return self.stiffness[self.free][:, self.free].tocsc()
 
     @cached_property
     def coupling(self) -> sp.csr_matrix:
-        """The stiffness between interior (rows) and boundary edges (columns)."""
+        """The stiffness between free (rows) and boundary edges (columns)."""
         return self.stiffness[self.free][:, self.fixed]
 
     @cached_property
     def _factors(self) -> Any:
         return factor(self.inner)
+
+    def apply(self, z: Float) -> Float:
+        """(e, k) stiffness times z (e, k)."""
+        out: Float = self.stiffness @ z
+        return out
+
+    def load(self, z: Float) -> Float:
+        """(f, k) what the boundary values of z (e, k) add to the right-hand side of the free edges."""
+        out: Float = -(self.coupling @ z[self.fixed])
+        return out
+
+    def shifted(self, shift: Float, scale: float = 1.0) -> Any:
+        """Factors of ``diag(shift) + scale * inner`` for a `shift` (f,)."""
+        return factor((sp.diags(shift) + scale * self.inner).tocsc())
 
     def difference(self, x: Float) -> Float:
         """(m, 3) value on edge k + 1 minus value on edge k."""

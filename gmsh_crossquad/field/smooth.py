@@ -8,7 +8,11 @@ length, and repeat with a smaller tau,
     (M + tau K) z_new = M z + tau f,    z <- z_new / |z_new|.
 
 The unknowns are the edge midpoints (Crouzeix–Raviart), so that a corner has both its directions.  In the plane z is taken in
-the global frame: one real matrix with the real and imaginary part as two right-hand sides.
+the global frame: one real matrix with the real and imaginary part as two right-hand sides.  On a curved surface every z is in
+the frame of its edge, and K is the connection Laplacian (`connection`).
+
+It starts from the harmonic z.  In a component without boundary that is 0: there it starts from a mode of least energy, found by
+inverse iteration of ``K + M / area`` from random numbers.  Those of a sphere have eight zeros of index 1/4 and no other.
 
 Diffusion has no core size.  With a given epsilon it is the start for a minimisation of the energy itself (`ginzburg_landau`).
 """
@@ -16,11 +20,11 @@ Diffusion has no core size.  With a given epsilon it is the start for a minimisa
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..records import CrossField, Float
+from .connection import ConnectionOperators
 from .ginzburg_landau import minimise_energy
-from .operators import FieldOperators, factor
+from .operators import FieldOperators
 from .singularities import QUARTER
 from .surface_mesh import SurfaceMesh
 
@@ -28,6 +32,8 @@ __all__ = ["edge_angle", "from_angles", "smooth_field", "wrap"]
 
 #: diffusion times over (diameter of the domain)^2, each with its greatest number of steps
 _TIMES = ((0.01, 4), (0.001, 6))
+#: inverse iterations for a component without boundary
+_ITERATIONS = 12
 
 
 def wrap(angle: Float) -> Float:
@@ -48,12 +54,12 @@ def from_angles(mesh: SurfaceMesh, theta: Float) -> CrossField:
 
 
 def smooth_field(mesh: SurfaceMesh, operators: FieldOperators, epsilon: float | None = None) -> CrossField:
-    """The smooth boundary-aligned cross field of a plane mesh.
+    """The smooth boundary-aligned cross field of a surface.
 
     Parameters
     ----------
     mesh : SurfaceMesh
-        With (n, 2) points.
+        Plane where its points are (n, 2).
     operators : FieldOperators
         Of the same mesh.
     epsilon : float, optional
@@ -65,29 +71,52 @@ def smooth_field(mesh: SurfaceMesh, operators: FieldOperators, epsilon: float | 
     CrossField
         Aligned with every boundary edge; where the boundary turns it chooses its own indices.
     """
-    direction = edge_angle(mesh)
-    frame = np.stack([np.cos(4 * direction), np.sin(4 * direction)], axis=1)
-    z = operators.solve(frame)
-    free = operators.free
-    mass = np.bincount(mesh.triangle_edges.ravel(), np.repeat(mesh.area / 3, 3), len(mesh.edges))[free]
-    load = -(operators.coupling @ frame[operators.fixed])
+    mass = np.bincount(mesh.triangle_edges.ravel(), np.repeat(mesh.area / 3, 3), len(mesh.edges)).astype(np.float64)
+    along: ConnectionOperators | FieldOperators
+    if mesh.points.shape[1] == 2:
+        along, direction = operators, edge_angle(mesh)
+        frame = np.stack([np.cos(4 * direction), np.sin(4 * direction)], axis=1)
+        z = operators.solve(frame)
+    else:
+        along, direction = ConnectionOperators(operators), np.zeros(len(mesh.edges))
+        frame = np.tile([1.0, 0.0], (len(mesh.edges), 1))
+        z = _start(mesh, along, frame, mass)
+    free = along.free
+    load = along.load(frame)
     inner = _unit(z[free])
     area = np.bincount(mesh.components[mesh.triangles[:, 0]], mesh.area).max()
     for time, steps in _TIMES:
         tau = time * area
-        lu = factor((sp.diags(mass) + tau * operators.inner).tocsc())
+        lu = along.shifted(mass[free], tau)
         for _ in range(steps):
-            new = _unit(lu.solve(mass[:, None] * inner + tau * load))
+            new = _unit(lu.solve(mass[free][:, None] * inner + tau * load))
             change = np.abs(new - inner).max()
             inner = new
             if change < 0.02:
                 break
     z[free] = inner
     if epsilon is not None:
-        z, _ = minimise_energy(mesh, operators, z, epsilon)
+        z, _ = minimise_energy(mesh, along, z, epsilon)
     theta = 0.25 * np.arctan2(z[:, 1], z[:, 0]) - direction
     theta[operators.fixed] = 0.0
     return from_angles(mesh, theta)
+
+
+def _start(mesh: SurfaceMesh, along: ConnectionOperators, frame: Float, mass: Float) -> Float:
+    """(e, 2) harmonic z with the values `frame` (e, 2) on the boundary; a mode of least energy where there is none."""
+    part = mesh.components[mesh.edges[along.free, 0]]
+    closed = mesh.component_closed[part]
+    area = np.bincount(mesh.components[mesh.triangles[:, 0]], mesh.area)
+    lu = along.shifted(np.where(closed, mass[along.free] / area[part], 0.0))
+    load = along.load(frame)
+    z = frame.copy()
+    z[along.free] = lu.solve(load)
+    if np.any(closed):
+        inner = np.random.default_rng(0).standard_normal((len(closed), 2))
+        for _ in range(_ITERATIONS):
+            inner = lu.solve(np.where(closed[:, None], mass[along.free][:, None] * inner / np.abs(inner[closed]).max(), load))
+        z[along.free] = inner
+    return z
 
 
 def _unit(z: Float) -> Float:

@@ -239,6 +239,12 @@ class SurfaceMesh:
         return vertices - edges + np.bincount(label[self.triangles[:, 0]], minlength=count)
 
     @cached_property
+    def component_closed(self) -> Bool:
+        """(c,) True for components without boundary."""
+        label = self.components
+        return np.bincount(label[self.edges[:, 0]], self.boundary_edge, int(label.max()) + 1) == 0
+
+    @cached_property
     def euler(self) -> int:
         """Euler characteristic."""
         return len(self.points) - len(self.edges) + len(self.triangles)
