@@ -23,6 +23,7 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import hypot
+from typing import NamedTuple
 
 from ..errors import LayoutError
 from .crossing import ONE, Chord, beside, meet
@@ -30,7 +31,7 @@ from .ports import SLIDE, Fan, Port
 from .step import ideal_exit
 from .trace_mesh import TraceMesh, next_of, previous_of
 
-__all__ = ["Trace", "grow"]
+__all__ = ["Growth", "Start", "Trace", "grow"]
 
 NUDGE = ONE >> 14
 """Step to a free place where the wanted one is taken."""
@@ -44,6 +45,26 @@ RETREATS = 64
 NONE: frozenset[int] = frozenset()
 
 
+class Start(NamedTuple):
+    """Where a trace begins that does not leave a seed (see `branches`).
+
+    Attributes
+    ----------
+    host, crossing : int
+        Trace beside whose crossing it begins; -1 at the boundary.
+    left : bool
+        On which side of the host.
+    half_edge, place : int
+        Half-edge through which it enters its first triangle, and where.
+    """
+
+    host: int
+    crossing: int
+    left: bool
+    half_edge: int
+    place: int
+
+
 @dataclass
 class Trace:
     """One separatrix.
@@ -51,7 +72,7 @@ class Trace:
     Attributes
     ----------
     seed, port : int
-        Background vertex, and which of its ports.
+        Background vertex, and which of its ports; without a seed a vertex of the same component, and -1.
     crossings : list of (half-edge, place)
         Where its chords leave their triangles, in order; the last one only on paper if it ends inside the triangle.
     host : Chord or None
@@ -60,6 +81,8 @@ class Trace:
         Its own last chord.
     along, across : float
         Fractions of the host's and of its own last chord where they meet.
+    start : Start or None
+        Where it begins if not at a seed.
     """
 
     seed: int
@@ -69,6 +92,7 @@ class Trace:
     last: Chord | None = None
     along: float = 0.0
     across: float = 0.0
+    start: Start | None = None
 
 
 def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Fan]], max_steps: int) -> list[Trace]:
@@ -91,10 +115,10 @@ def grow(mesh: TraceMesh, seeds: Sequence[tuple[int, Fan]], max_steps: int) -> l
     LayoutError
         If a trace does not end, or there is no way on.
     """
-    return _Growth(mesh, max_steps).run(seeds)
+    return Growth(mesh, max_steps).run(seeds)
 
 
-class _Growth:
+class Growth:
     """The state of `grow`."""
 
     def __init__(self, mesh: TraceMesh, max_steps: int) -> None:
@@ -107,6 +131,7 @@ class _Growth:
         self.closed: dict[int, set[int]] = {}
 
     def run(self, seeds: Sequence[tuple[int, Fan]]) -> list[Trace]:
+        """Grow all separatrices, see `grow`."""
         heap: list[tuple[float, int, int, int, int]] = []
         for vertex, fan in seeds:
             for h, branches in fan.gates:
@@ -123,6 +148,15 @@ class _Growth:
                 heapq.heapreplace(heap, state)
         return self.traces
 
+    def follow(self, trace: Trace, branch: int) -> None:
+        """Grow a trace that begins on an edge to its end, from `branch` in its first triangle."""
+        assert trace.start is not None
+        self.traces.append(trace)
+        state: tuple[float, int, int, int, int] | None
+        state = (0.0, len(self.traces) - 1, trace.start.half_edge, trace.start.place, branch)
+        while state is not None:
+            state = self._advance(*state)
+
     def _start(self, vertex: int, number: int, port: Port) -> tuple[float, int, int, int, int]:
         mesh, h = self.mesh, port.half_edge
         t, k = divmod(h, 3)
@@ -130,7 +164,7 @@ class _Growth:
         trace = Trace(vertex, number)
         self.traces.append(trace)
         place = int(port.fraction * ONE)
-        while not self._take(h, place):
+        while not self.take(h, place):
             place += NUDGE
         chord = Chord(corner * ONE, k * ONE + place, port.branch, len(self.traces) - 1, 0, None)
         return self._record(trace, t, chord, mesh.x[3 * t + corner], mesh.y[3 * t + corner], 0.0)
@@ -186,7 +220,7 @@ class _Growth:
                 b = beside(chords, a, b, branch, shut)
                 if b < 0:
                     return -1, None
-            elif self._take(out, b % ONE):
+            elif self.take(out, b % ONE):
                 return b, host
             else:
                 b += NUDGE if b % ONE < ONE // 2 else -NUDGE
@@ -219,7 +253,7 @@ class _Growth:
             return n, SLIDE
         return p, 1.0 - SLIDE
 
-    def _take(self, h: int, place: int) -> bool:
+    def take(self, h: int, place: int) -> bool:
         """Take a place on an edge; False if somebody has it."""
         g = self.mesh.twin[h]
         key = (h * 2 * ONE + place) if g < 0 or h < g else (g * 2 * ONE + ONE - place)
