@@ -39,14 +39,14 @@ def test_the_quadratic_form_is_the_energy(holes):
     vertices = [at(mesh, *p) for p in ((2, 9), (10, 10), (17, 4), (16, 15))]
     aligner, field = aligned(mesh, square_corners(mesh), vertices, [1, -1, 2, -2])
     paths = _paths(graph(mesh), np.array(vertices))
-    energies = _Energies(aligner, field, paths)
+    energies = _Energies(aligner, field, paths, [])
     before = aligner.operators.energy(field.rotation)
     for amount in ([0, 0, 0, 0], [0, -1, 0, 0], [0, -1, 1, -1], [0, -1, 2, -2], [0, 3, -1, 2]):
         rotation = field.rotation.copy()
         for path, n in zip(paths, amount):
             move_index(mesh, rotation, path, n)
         after = aligner.operators.energy(aligner.rotate(CrossField(field.theta, rotation)).field.rotation)
-        assert energies(np.array(amount)) == pytest.approx(after - before, rel=1e-9, abs=1e-9)
+        assert energies.best(np.array(amount))[0] == pytest.approx(after - before, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("places", [((4, 4), (5, 4)), ((3, 3), (20, 17)), ((3, 20), (12, 3))])

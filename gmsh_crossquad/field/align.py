@@ -109,6 +109,12 @@ class Aligner:
         self.holes = [i for i, loop in enumerate(self.loops) if not loop.outer]
         self._basis: tuple[Float, Float] | None = None
 
+    @property
+    def rims(self) -> list[Int]:
+        """The loops that limit the clearance of singularities, as vertices: holes in the plane, all loops on curved surfaces."""
+        plane = self.mesh.points.shape[1] == 2
+        return [loop.vertices for loop in self.loops if not (plane and loop.outer)]
+
     def close(self, rotation: Float) -> Float:
         """Copy of `rotation` (m, 3) whose degree along every loop is what the boundary indices ask for."""
         out = rotation.copy()

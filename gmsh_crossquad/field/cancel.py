@@ -11,9 +11,11 @@ difference that vanishes on the boundary, so the energy is a quadratic form in (
 
     <R_i, R_j> = <r_i, R_j>,   <R_i, grad a_j> = <r_i, grad a_j>,   <F, R_i> = <F, r_i>,
 
-and one back-substitution per singularity gives the energies of all combinations.  The pair whose cancellation gives the least
-energy is cancelled, with the best m, as long as the energy rises by at most `_PAIR` each time: singularities cost
-blocks, and their own energy depends on the size of the triangles at their cores.
+and one back-substitution per singularity gives the energies of all combinations.  On a surface with handles loops around them
+join the paths, with free integers like those of the holes (see `handles`): a field keeps its homotopy class for as long as
+singularities stay, but which class is best depends on them.  The pair whose cancellation gives the least energy is cancelled,
+with the best integers, as long as the energy rises by at most `_PAIR` each time: singularities cost blocks, and their own energy
+depends on the size of the triangles at their cores.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import scipy.sparse as sp
 
 from ..records import CrossField, Float, Int
 from .align import Aligner, closest
+from .handles import handle_loops
 from .singularities import QUARTER, move_index, singular_vertices
 
 __all__ = ["cancel_pairs"]
@@ -48,9 +51,13 @@ class _Energies:
         Aligned and harmonic.
     paths : list of list of int
         Edge paths through interior vertices; all end at the root.
+    handles : list of list of int
+        Loops around handles.
     """
 
-    def __init__(self, aligner: Aligner, field: CrossField, paths: list[list[int]]) -> None:
+    def __init__(self, aligner: Aligner, field: CrossField, paths: list[list[int]], handles: list[list[int]]) -> None:
+        self.count = len(paths)
+        paths = paths + handles
         operators = aligner.operators
         cocycles = np.zeros((len(paths), *field.rotation.shape))
         for cocycle, path in zip(cocycles, paths):
@@ -63,24 +70,24 @@ class _Energies:
         second = aligner.mesh.triangle_edges[triangle, (corner + 1) % 3]
         moved = cocycles.reshape(len(paths), -1)[:, rows]
         weighted = moved * operators.weight.ravel()[rows]
-        self.slope = weighted @ field.rotation.ravel()[rows]
-        self.pairs = weighted @ (moved.T + x[second] - x[first])
-        self.holes: tuple[Float, Float, Float] | None = None
+        slope = weighted @ field.rotation.ravel()[rows]
+        form = weighted @ (moved.T + x[second] - x[first])
         if aligner.holes:
             basis, energy = aligner.harmonic()
-            flux = aligner.flux(field.rotation)[aligner.holes]
-            self.holes = weighted @ (basis[second] - basis[first]), energy, flux
+            mixed = QUARTER * weighted @ (basis[second] - basis[first])
+            slope = np.concatenate([slope, QUARTER * aligner.flux(field.rotation)[aligner.holes]])
+            form = np.block([[form, mixed], [mixed.T, QUARTER**2 * energy]])
+        self.slope, self.form = slope, form
 
-    def __call__(self, amount: Int) -> float:
-        """Energy that moving `amount` (k,) quarter turns adds, with the best integers of the holes."""
-        n = amount.astype(float)
-        rise = float(n @ self.slope + 0.5 * n @ self.pairs @ n)
-        if self.holes is None:
-            return rise
-        mixed, energy, flux = self.holes
-        pull = flux + n @ mixed
-        m = QUARTER * closest(energy, -pull / QUARTER)
-        return rise + float(pull @ m + 0.5 * m @ energy @ m)
+    def best(self, amount: Int) -> tuple[float, Int]:
+        """Energy that moving `amount` (k,) quarter turns along the paths adds, and the best integers of handles and holes."""
+        k, n = self.count, amount.astype(float)
+        rise = float(n @ self.slope[:k] + 0.5 * n @ self.form[:k, :k] @ n)
+        if len(self.slope) == k:
+            return rise, np.zeros(0, np.int64)
+        pull, energy = self.slope[k:] + n @ self.form[:k, k:], self.form[k:, k:]
+        m = closest(energy, -pull)
+        return rise + float(pull @ m + 0.5 * m @ energy @ m), m
 
 
 def cancel_pairs(aligner: Aligner, field: CrossField) -> CrossField:
@@ -99,47 +106,54 @@ def cancel_pairs(aligner: Aligner, field: CrossField) -> CrossField:
     """
     mesh = aligner.mesh
     vertices, index = singular_vertices(mesh, field.rotation)
-    if not (np.any(index > 0) and np.any(index < 0)):
+    handles = handle_loops(mesh)
+    if not handles and not (np.any(index > 0) and np.any(index < 0)):
         return field
     from scipy.sparse.csgraph import connected_components
 
     a, b = mesh.edges[~mesh.boundary_vertex[mesh.edges].any(axis=1)].T
     length = np.linalg.norm(mesh.points[b] - mesh.points[a], axis=1)
     graph = sp.coo_matrix((length, (a, b)), (len(mesh.points), len(mesh.points))).tocsr()
-    part = connected_components(graph, directed=False)[1][vertices]
+    part = connected_components(graph, directed=False)[1]
     rotation = field.rotation.copy()
     moved = False
-    for here in (part == label for label in np.unique(part)):
-        if not (np.any(index[here] > 0) and np.any(index[here] < 0)):
+    for label in np.unique(np.concatenate([part[vertices], part[[loop[0] for loop in handles]]])):
+        here = part[vertices] == label
+        around = [loop for loop in handles if part[loop[0]] == label]
+        if not around and not (np.any(index[here] > 0) and np.any(index[here] < 0)):
             continue
-        for path, amount in _moves(aligner, field, graph, vertices[here], index[here]):
+        for path, amount in _moves(aligner, field, graph, vertices[here], index[here], around):
             move_index(mesh, rotation, path, amount)
             moved = True
     return aligner.rotate(replace(field, rotation=rotation)).field if moved else field
 
 
-def _moves(aligner: Aligner, field: CrossField, graph: sp.csr_matrix, vertices: Int, index: Int) -> list[tuple[list[int], int]]:
-    """Edge paths among singularities of one part of the face, and the quarter turns to move along them."""
+def _moves(
+    aligner: Aligner, field: CrossField, graph: sp.csr_matrix, vertices: Int, index: Int, handles: list[list[int]]
+) -> list[tuple[list[int], int]]:
+    """Edge paths among singularities of one part of the face and around its handles, and the quarter turns to move along them."""
     used, pairs = np.unique(_candidates(aligner.mesh.points[vertices], index), return_inverse=True)
     pairs = pairs.reshape(-1, 2)
     paths = _paths(graph, vertices[used])
-    energies = _Energies(aligner, field, paths)
+    energies = _Energies(aligner, field, paths, handles)
     start = index[used]
-    amount, added = np.zeros_like(start), 0.0
+    amount = np.zeros_like(start)
+    added, turns = energies.best(amount)
     for _ in range(int(np.abs(start).sum())):
-        best: tuple[float, Int] | None = None
+        best: tuple[float, Int, Int] | None = None
         for plus, minus in pairs.tolist():
             if start[plus] > amount[plus] and start[minus] < amount[minus]:
                 trial = amount.copy()
                 trial[plus] += 1
                 trial[minus] -= 1
-                energy = energies(trial)
+                energy, free = energies.best(trial)
                 if best is None or energy < best[0]:
-                    best = energy, trial
+                    best = energy, trial, free
         if best is None or best[0] > added + _PAIR:
             break
-        added, amount = best
-    return [(path, int(n)) for path, n in zip(paths, amount) if n]
+        added, amount, turns = best
+    moves = zip(paths + handles, np.concatenate([amount, turns[: len(handles)]]), strict=True)
+    return [(path, int(n)) for path, n in moves if n]
 
 
 def _candidates(p: Float, index: Int) -> Int:
@@ -158,6 +172,8 @@ def _paths(graph: sp.csr_matrix, vertices: Int) -> list[list[int]]:
     """Shortest edge paths from vertices to the first of them."""
     from scipy.sparse.csgraph import dijkstra
 
+    if not len(vertices):
+        return []
     before = dijkstra(graph, directed=False, indices=vertices[:1], return_predecessors=True)[1][0]
     out = []
     for v in vertices.tolist():

@@ -4,7 +4,9 @@ The aligned field is harmonic; ``F_i = closed integral of d_n theta`` around hol
 blocks that go around the hole come back larger or smaller, separatrices spiral, and the layout may have no integer divisions.
 With alpha_i harmonic, 1 on hole i and 0 on all other loops, and d_k the index of the singularity at a_k in quarter turns,
 
-    dF_i / da_k = (pi d_k / 2) (-d_y alpha_i, d_x alpha_i)(a_k):
+    dF_i / da_k = (pi d_k / 2) (-d_y alpha_i, d_x alpha_i)(a_k)
+
+(the gradient of alpha turned by 90 degrees, a tangent vector on a curved surface):
 
 singularities that go around the hole change its flux, those that come nearer or go away do not.  Another integer per hole
 (see `align`) changes F by a column of ``(pi/2) A``, so that F = 0 has many solutions; wanted is the nearest one.
@@ -30,6 +32,7 @@ from .clearance import Clearance
 from .forces import gradient
 from .singularities import QUARTER, move_index, singular_vertices, walk
 from .surface_mesh import SurfaceMesh
+from .tangents import length, quarter_turn, settled, tangential
 
 __all__ = ["Moved", "excess", "flux_slope", "vanish_flux"]
 
@@ -41,17 +44,18 @@ _SMALL = 1e-5
 
 
 def flux_slope(aligner: Aligner, vertices: Int, index: Int) -> Float:
-    """(holes, k, 2) derivatives of the fluxes by the positions of singularities at `vertices` (k,) of indices `index` (k,)."""
+    """(holes, k, d) derivatives of the fluxes by the positions of singularities at `vertices` (k,) of indices `index` (k,)."""
     mesh = aligner.mesh
     basis = aligner.harmonic()[0]
-    out = np.zeros((len(aligner.holes), len(vertices), 2))
+    dimension = mesh.points.shape[1]
+    out = np.zeros((len(aligner.holes), len(vertices), dimension))
     weight = np.repeat(mesh.area, 3)
     corner = mesh.triangles.ravel()
     total = np.bincount(corner, weight, len(mesh.points))[vertices]
     for i in range(len(aligner.holes)):
-        g = gradient(mesh, aligner.operators.difference(basis[:, i]))
-        x, y = (np.bincount(corner, weight * np.repeat(g[:, c], 3), len(mesh.points))[vertices] / total for c in range(2))
-        out[i] = QUARTER * index[:, None] * np.stack([-y, x], axis=1)
+        g = quarter_turn(gradient(mesh, aligner.operators.difference(basis[:, i])), mesh.triangle_normal)
+        sums = [np.bincount(corner, weight * np.repeat(x, 3), len(mesh.points))[vertices] / total for x in g.T]
+        out[i] = QUARTER * index[:, None] * tangential(mesh, vertices, np.stack(sums, axis=1))
     return out
 
 
@@ -96,7 +100,7 @@ def vanish_flux(
     ----------
     aligner : Aligner
     clearance : Clearance
-        Of the same mesh, a plane one.
+        Of the same mesh.
     field : CrossField
         Aligned and harmonic.
     held : list of int
@@ -121,12 +125,13 @@ def vanish_flux(
     small = _SMALL * QUARTER**2 * float(np.diag(energy).min())
     state = _State(field, vertices, mesh.points[vertices].copy(), flux)
     guard = _Guard(clearance, state.positions)
+    normal = mesh.vertex_normal
     target: Float | None = None
     best, least, waiting = state, np.inf, 0
     for _ in range(_ROUNDS):
         slope = _slopes(aligner, state.vertices, index, moving)
         room = clearance.room(state.positions)
-        weight = np.repeat(room**2, 2)
+        weight = np.repeat(room**2, mesh.points.shape[1])
         gram = (slope * weight) @ slope.T
         inverse = np.linalg.pinv(gram, rcond=1e-9)
         if target is None:
@@ -138,9 +143,9 @@ def vanish_flux(
         best, least, waiting = (state, size, 0) if size < least else (best, least, waiting + 1)
         if size < small or waiting == _PATIENCE:
             break
-        step = (weight * (slope.T @ (inverse @ missing))).reshape(-1, 2)
-        push = guard.push(state.positions, step) * moving[:, None]
-        push -= (weight * (slope.T @ (inverse @ (slope @ push.ravel())))).reshape(-1, 2)
+        step = (weight * (slope.T @ (inverse @ missing))).reshape(state.positions.shape)
+        push = guard.push(state.positions, step, None if normal is None else normal[state.vertices]) * moving[:, None]
+        push -= (weight * (slope.T @ (inverse @ (slope @ push.ravel())))).reshape(push.shape)
         state = _moved(
             aligner, state, index, state.positions + _limited(step, 0.5 * room) + _limited(push, 0.25 * room), avoid, slope
         )
@@ -162,7 +167,7 @@ def excess(energy: Float, flux: Float) -> float:
 
 
 def _slopes(aligner: Aligner, vertices: Int, index: Int, moving: Bool) -> Float:
-    """(holes, 2 k) derivatives of the fluxes by all coordinates; 0 for what does not move."""
+    """(holes, d k) derivatives of the fluxes by all coordinates; 0 for what does not move."""
     slope = flux_slope(aligner, vertices, index) * moving[None, :, None]
     return slope.reshape(len(slope), -1)
 
@@ -184,14 +189,13 @@ def _combination(mesh: SurfaceMesh, energy: Float, missing: Float, slope: Float,
     return goal
 
 
-def _limited(step: Float, length: Float) -> Float:
-    """Steps (k, 2), all scaled alike so that none is longer than its `length` (k,)."""
-    own = np.hypot(step[:, 0], step[:, 1])
-    return step * min(1.0, float((length / np.maximum(own, np.finfo(float).tiny)).min()))
+def _limited(step: Float, most: Float) -> Float:
+    """Steps (k, d), all scaled alike so that none is longer than its `most` (k,)."""
+    return step * min(1.0, float((most / np.maximum(length(step), np.finfo(float).tiny)).min()))
 
 
 def _moved(aligner: Aligner, state: _State, index: Int, goal: Float, avoid: Bool, slope: Float) -> _State:
-    """Put singularities at the vertices nearest to `goal` (k, 2) and align again; `slope` (holes, 2 k) continues the flux."""
+    """Put singularities at the vertices nearest to `goal` (k, d) and align again; `slope` (holes, d k) continues the flux."""
     mesh = aligner.mesh
     rotation = state.field.rotation.copy()
     vertices = state.vertices.copy()
@@ -208,7 +212,7 @@ def _moved(aligner: Aligner, state: _State, index: Int, goal: Float, avoid: Bool
     predicted = state.flux + slope @ (mesh.points[vertices] - mesh.points[state.vertices]).ravel()
     energy = aligner.harmonic()[1]
     turns = np.rint(np.linalg.solve(energy, predicted - flux) / QUARTER)
-    return _State(field, vertices, goal, flux + QUARTER * energy @ turns)
+    return _State(field, vertices, settled(mesh, vertices, goal), flux + QUARTER * energy @ turns)
 
 
 class _Guard:
@@ -217,21 +221,21 @@ class _Guard:
     def __init__(self, clearance: Clearance, positions: Float) -> None:
         self.clearance = clearance
         self.keep = np.minimum(clearance.wanted(positions), clearance.distance(positions)[0])
-        distance = np.hypot(*(positions[:, None] - positions[None]).transpose(2, 0, 1))
+        distance = length(positions[:, None] - positions[None])
         self.apart = np.minimum(self.keep[:, None] + self.keep[None], distance)
 
-    def push(self, positions: Float, step: Float) -> Float:
-        """(k, 2) displacements that give room to singularities at `positions` (k, 2) which want to make a `step` (k, 2)."""
+    def push(self, positions: Float, step: Float, normal: Float | None) -> Float:
+        """(k, d) displacements that give room to singularities at `positions` (k, d) which want to make a `step` (k, d)."""
         depth, away = self.clearance.distance(positions)
         out = np.maximum(self.keep - depth, 0.0)[:, None] * away
         apart = positions[:, None] - positions[None]
-        distance = np.hypot(apart[..., 0], apart[..., 1])
+        distance = length(apart)
         np.fill_diagonal(distance, np.inf)
         unit = apart / distance[..., None]
         out += np.sum(np.maximum(self.apart - distance, 0.0)[..., None] * unit, axis=1)
         # what comes nearer turns around the middle between both, on the side where it is already
         closing = step[:, None] - step[None]
-        side = np.stack([-unit[..., 1], unit[..., 0]], axis=2)
+        side = quarter_turn(unit, None if normal is None else normal[:, None])
         speed = np.sum(closing * unit, axis=2)
         across = np.where(np.sum(closing * side, axis=2) >= 0, 1.0, -1.0)
         near = np.where(speed < 0, np.maximum(2.0 * self.apart - distance, 0.0), 0.0)

@@ -17,6 +17,7 @@ from .align import Aligner
 from .clearance import Clearance
 from .flux import Moved, excess, flux_slope, vanish_flux
 from .singularities import move_index, shortest_path, singular_vertices
+from .tangents import length
 
 __all__ = ["add_pair"]
 
@@ -50,10 +51,10 @@ def add_pair(aligner: Aligner, clearance: Clearance, field: CrossField, held: li
         return None
     room = clearance.distance(mesh.points[inside])[0]
     for v in singular:
-        room = np.minimum(room, 0.5 * np.hypot(*(mesh.points[inside] - mesh.points[v]).T))
+        room = np.minimum(room, 0.5 * length(mesh.points[inside] - mesh.points[v]))
     first = int(inside[np.argmax(room)])
     offset = mesh.points[inside] - mesh.points[first]
-    distance = np.hypot(*offset.T)
+    distance = length(offset)
     near = (distance > 0) & (distance < 0.7 * room.max())
     if not np.any(near):
         return None

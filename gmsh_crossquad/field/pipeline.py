@@ -78,7 +78,7 @@ def aligned_field(
     smooth = smooth_field(surface, operators, epsilon)
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
     current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation)).field)
-    clearance = Clearance(surface, [aligner.loops[i].vertices for i in aligner.holes])
+    clearance = Clearance(surface, aligner.rims)
     corners = np.flatnonzero(surface.boundary_vertex & np.isfinite(mesh.opening_angle))
     rotation, held = leave_corners(surface, clearance, current.rotation, wanted, corners, mesh.port)
     current = aligner.rotate(CrossField(current.theta, rotation)).field
@@ -127,7 +127,7 @@ def _given(
 
 def _relaxed(aligner: Aligner, mesh: FaceMesh, start: CrossField, given: CrossField) -> AlignedField:
     """The harmonic field without flux around holes, with singularities near those of `start`."""
-    clearance = Clearance(aligner.mesh, [aligner.loops[i].vertices for i in aligner.holes])
+    clearance = Clearance(aligner.mesh, aligner.rims)
     moved = vanish_flux(aligner, clearance, aligner.rotate(start).field, [], mesh.port)
     aligned = aligner.finish(aligner.rotate(moved.field), moved.field)
     steps = tuple((int(a), int(b)) for a, b in zip(moved.start, moved.end, strict=True) if a != b)

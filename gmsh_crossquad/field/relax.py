@@ -7,7 +7,8 @@ vertex nearest to the position so found and is moved by whole quarter turns alon
 indices add up to.
 
 A singularity that a corner would absorb, because the field alone prefers another number of quads there, is not left to the
-force: it goes onto the corner's bisector, at 0.6 of the length over which the sector is free, and stays there.
+force: it goes onto the corner's bisector (a geodesic on curved faces), at 0.6 of the length over which the sector is free, and
+stays there.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from ..records import Bool, CrossField, Float, Int
 from .align import Aligner
 from .clearance import Clearance
 from .forces import forces
+from .geodesic import geodesic
 from .singularities import QUARTER, move_index, singular_vertices, walk
 from .surface_mesh import SurfaceMesh
+from .tangents import length, tangential
 
 __all__ = ["leave_corners", "relax_singularities"]
 
@@ -60,12 +63,8 @@ def leave_corners(
         signs = [sign for sign in (1, -1) if pull[sign] > -0.25 * _UNIT and np.any(index * sign > 0)]
         if not signs:
             continue
-        origin = mesh.points[v]
-        start = mesh.points[mesh.neighbours(v)[0]] - origin
-        bisector = np.arctan2(start[1], start[0]) + 0.5 * angle
-        direction = np.array([np.cos(bisector), np.sin(bisector)])
-        free = clearance.free_length(origin, direction, float(np.sin(0.5 * min(angle, np.pi))), float(np.hypot(*start)))
-        distance = np.hypot(*(mesh.points[vertices] - origin).T)
+        free, goal = _bisector(mesh, clearance, v)
+        distance = length(mesh.points[vertices] - mesh.points[v])
         for sign in signs:
             near = np.flatnonzero((index * sign > 0) & (distance < 0.4 * free) & ~np.isin(vertices, held))
             if not len(near):
@@ -73,12 +72,27 @@ def leave_corners(
             k = int(near[np.argmin(distance[near])])
             barred = mesh.boundary_vertex | avoid
             barred[np.delete(vertices, k)] = True
-            path = walk(mesh, int(vertices[k]), origin + 0.6 * free * direction, barred)
+            path = walk(mesh, int(vertices[k]), goal, barred)
             move_index(mesh, out, path, int(index[k]))
             vertices[k] = path[-1]
             if pull[sign] > _UNIT:
                 held.append(int(vertices[k]))
     return out, held
+
+
+def _bisector(mesh: SurfaceMesh, clearance: Clearance, corner: int) -> tuple[float, Float]:
+    """Length over which the bisector of a corner is free, and the point (d,) at 0.6 of it."""
+    origin, angle = mesh.points[corner], float(mesh.angle_sum[corner])
+    start = mesh.points[mesh.neighbours(corner)[0]] - origin
+    spread, first = float(np.sin(0.5 * min(angle, np.pi))), float(length(start))
+    if len(origin) == 3:
+        line = geodesic(mesh, corner, 0.5 * angle, 2.0 * clearance.extent)
+        free = clearance.free_along(line.at, spread, first)
+        return free, line.at(np.array([0.6 * free]))[0]
+    bisector = np.arctan2(start[1], start[0]) + 0.5 * angle
+    direction = np.array([np.cos(bisector), np.sin(bisector)])
+    free = clearance.free_length(origin, direction, spread, first)
+    return free, origin + 0.6 * free * direction
 
 
 def attraction(angle: float, quads: int, sign: int) -> float:
@@ -121,13 +135,12 @@ def relax_singularities(aligner: Aligner, clearance: Clearance, field: CrossFiel
     for _ in range(_ROUNDS):
         here = mesh.points[vertices]
         clear = clearance.room(here)
-        force = forces(mesh, field.rotation, here, 0.9 * clear)
+        force = tangential(mesh, vertices, forces(mesh, field.rotation, here, 0.9 * clear))
         turned = np.sum(force * previous, axis=1) < 0
         pace = np.where(turned, 0.5 * pace, pace)
         previous = force
         step = force * (pace * clear**2 / (_UNIT * index**2))[:, None]
-        length = np.hypot(step[:, 0], step[:, 1])
-        step *= np.minimum(1.0, 0.5 * clear / np.maximum(length, np.finfo(float).tiny))[:, None]
+        step *= np.minimum(1.0, 0.5 * clear / np.maximum(length(step), np.finfo(float).tiny))[:, None]
         goal = here + step
         for _ in range(3):
             depth, away = clearance.distance(goal)

@@ -73,7 +73,7 @@ def alternatives(mesh: FaceMesh, aligned: AlignedField, held: Int, *, move: bool
 
 def _tools(surface: SurfaceMesh, aligned: AlignedField) -> tuple[Aligner, Clearance]:
     aligner = Aligner(surface, FieldOperators(surface), aligned.index)
-    return aligner, Clearance(surface, [aligner.loops[i].vertices for i in aligner.holes])
+    return aligner, Clearance(surface, aligner.rims)
 
 
 def _finished(

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import LayoutError
 from ..records import Bool, Float
 from .clearance import Clearance
+from .geodesic import geodesic
 from .singularities import move_index, singular_vertices, walk
 from .surface_mesh import SurfaceMesh
 
@@ -29,7 +30,6 @@ def split_strong(
     Parameters
     ----------
     mesh : SurfaceMesh
-        Plane.
     clearance : Clearance
         Of the same mesh.
     rotation : (m, 3) float64
@@ -58,9 +58,8 @@ def split_strong(
     for v, q, radius in zip(vertices.tolist(), index.tolist(), (_RADIUS * room).tolist()):
         if q <= 1:
             continue
-        for angle in 2 * np.pi * np.arange(q) / q:
-            goal = mesh.points[v] + radius * np.array([np.cos(angle), np.sin(angle)])
-            path = walk(mesh, v, goal, barred)
+        for part in np.arange(q) / q:
+            path = walk(mesh, v, _place(mesh, v, float(part), radius), barred)
             if len(path) < 2:
                 raise LayoutError(
                     f"there is no room to split a singularity of index {q}/4",
@@ -71,3 +70,11 @@ def split_strong(
             barred[path[-1]] = True
             moved.append((v, path[-1]))
     return out, tuple(moved)
+
+
+def _place(mesh: SurfaceMesh, vertex: int, part: float, radius: float) -> Float:
+    """The point (d,) of a circle around a vertex, a `part` of a full turn from the x axis or, in space, from its first edge."""
+    if mesh.points.shape[1] == 3:
+        return geodesic(mesh, vertex, part * float(mesh.angle_sum[vertex]), radius).points[-1]
+    angle = 2 * np.pi * part
+    return mesh.points[vertex] + radius * np.array([np.cos(angle), np.sin(angle)])

@@ -126,6 +126,25 @@ class SurfaceMesh:
         return out
 
     @cached_property
+    def triangle_normal(self) -> Float | None:
+        """(m, 3) unit normals of the triangles; None in the plane."""
+        if self.points.shape[1] == 2:
+            return None
+        p = self.points[self.triangles]
+        normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        return normal / np.linalg.norm(normal, axis=1)[:, None]
+
+    @cached_property
+    def vertex_normal(self) -> Float | None:
+        """(n, 3) unit means of the triangles' normals, weighted by their angles; None in the plane."""
+        if self.triangle_normal is None:
+            return None
+        weighted = self.corner_angle.ravel()[:, None] * np.repeat(self.triangle_normal, 3, axis=0)
+        sums = [np.bincount(self.triangles.ravel(), w, len(self.points)) for w in weighted.T]
+        normal = np.stack(sums, axis=1)
+        return normal / np.linalg.norm(normal, axis=1)[:, None]
+
+    @cached_property
     def half_edge_direction(self) -> Float:
         """(m, 3) angle of every half-edge in its triangle's layout."""
         a = self.corner_angle
