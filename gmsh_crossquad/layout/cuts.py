@@ -17,7 +17,7 @@ import numpy as np
 from ..records import Bool, Int, TMesh
 from .quotient import Join, Quotient
 
-__all__ = ["Cut", "separation_cuts"]
+__all__ = ["Cut", "PathCut", "separation_cuts"]
 
 Expression = dict[int, int]
 
@@ -64,7 +64,7 @@ def separation_cuts(tmesh: TMesh, q: Quotient) -> list[Cut]:
     for j in q.joins:
         neighbours[j.a].append((j.b, j))
         neighbours[j.b].append((j.a, j))
-    finder = _PathCut(tmesh, q, neighbours)
+    finder = PathCut(tmesh, q, neighbours)
     cuts: list[Cut] = []
     for members in np.split(order, splits):
         if len(members) < 2:
@@ -92,14 +92,18 @@ def _frozen(expression: Expression, sign: int = 1) -> tuple[tuple[int, int], ...
     return tuple(sorted((arc, sign * c) for arc, c in expression.items() if c))
 
 
-class _PathCut:
+class PathCut:
     """Shortest join paths and the linear conditions that break them."""
 
     def __init__(self, tmesh: TMesh, q: Quotient, neighbours: dict[int, list[tuple[int, Join]]]) -> None:
         self.tmesh, self.q, self.neighbours = tmesh, q, neighbours
 
     def cut(self, sources: list[int], targets: set[int], on_curves_only: bool = False) -> Cut:
-        path = self._path(sources, targets, on_curves_only)
+        """Cut along the shortest path between two sets of elements."""
+        return self.along(self._path(sources, targets, on_curves_only))
+
+    def along(self, path: list[tuple[int, Join, int]]) -> Cut:
+        """Cut along a path of joins, each (element, join, next element)."""
         widths: Expression = defaultdict(int)
         options: list[tuple[tuple[tuple[int, int], ...], int]] = []
         n_nodes = len(self.tmesh.position)
@@ -113,8 +117,8 @@ class _PathCut:
             sides = self.tmesh.patches[join.patch]
             for arc, _ in sides[join.axis]:
                 widths[arc] += 1
-            near, far = self._sides(join, x, y)
-            here, there = self._height(near, x), self._height(far, y)
+            near, far = self.sides(join, x, y)
+            here, there = self.height(near, x), self.height(far, y)
             if here is None or there is None:
                 leaf = None
                 continue
@@ -169,14 +173,14 @@ class _PathCut:
             end = step[0]
         return path[::-1]
 
-    def _sides(self, join: Join, x: int, y: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
+    def sides(self, join: Join, x: int, y: int) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
         """The two long sides of a degenerate patch, running alike: the one that holds x, the one that holds y."""
         sides = self.tmesh.patches[join.patch]
         one = sides[1 - join.axis]
         two = tuple((arc, -way) for arc, way in reversed(sides[3 - join.axis]))
         return (one, two) if (x, y) == (join.a, join.b) else (two, one)
 
-    def _height(self, side: tuple[tuple[int, int], ...], element: int) -> tuple[Expression, int, int] | None:
+    def height(self, side: tuple[tuple[int, int], ...], element: int) -> tuple[Expression, int, int] | None:
         """Divisions before `element` on a side, and the arc that holds it with its way (-1, 0 for a node)."""
         total: Expression = defaultdict(int)
         for arc, way in side:

@@ -2,7 +2,7 @@
 
     min sum_a f_a(n_a),  n_a >= 0 integer,
     equal sums on opposite sides of every patch, every open CAD curve >= 1, closed curve >= 3, boundary loop >= 3,
-    separation cuts (module `cuts`), found lazily; shifts between the sides of thin strips cost (module `alignment`).
+    separation cuts (modules `cuts`, `handles`), found lazily; shifts between the sides of thin strips cost (module `alignment`).
 
 t_a is the arc's length over the wanted block size.  The cost is the factor by which edges miss their size,
 f(n) = t/n - 1 for 1 <= n <= t, (n - t) / max(t, 1/2) for n > t, and f(0) = 2 t: convex.  It is taken piecewise linear with
@@ -23,6 +23,7 @@ from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
 from .alignment import alignment
 from .cuts import Cut, separation_cuts
+from .handles import handle_cuts, homology
 from .integer_program import IntegerProgram
 from .quotient import quotient
 
@@ -150,6 +151,7 @@ def quantize(
             sums = sp.csr_array((np.ones(len(row)), (row, column)), shape=(len(bounds), n_arcs))
             add(sums, count if equal else np.full(len(count), -np.inf), count)
 
+    classes = homology(model, tmesh)
     known: set[Cut] = set()
     new = _at_least(tmesh, model)
     n_base = len(set(new))
@@ -164,7 +166,8 @@ def quantize(
                 remedy="another size, or fewer short curves, may help",
             )
         divisions = (floor + expand @ solution.values[: len(arc)]).astype(np.int64)
-        new = [c for c in separation_cuts(tmesh, quotient(tmesh, divisions)) if c not in known]
+        found = quotient(tmesh, divisions)
+        new = [c for c in separation_cuts(tmesh, found) or handle_cuts(tmesh, found, classes) if c not in known]
         if progress is not None:
             progress(
                 f"quantization round {round_}: cost {solution.cost:.4g}, bound {solution.bound:.4g}, "
