@@ -53,7 +53,8 @@ def aligned_field(
     fix : bool
         Where the singularities of a given field do not fit the boundary indices, change as few as possible (see `compatibility`).
     split : bool
-        Share indices of 1/2 and more of a given field among several points, as a mesh needs it (see `strong`).
+        Share indices of 1/2 and more of a given field among several points, as a mesh needs it (see `strong`).  Those that the
+        smooth field has by symmetry, or at the apex of a cone, are shared in any case.
     prescribed : (n,) bool, optional
         Boundary vertices whose index the user chose, which `fix` may change.
     epsilon : float, optional
@@ -79,6 +80,9 @@ def aligned_field(
     rotation = snap_to_vertices(surface, correct_boundary(surface, smooth.rotation, wanted), mesh.port)
     current = cancel_pairs(aligner, aligner.rotate(CrossField(smooth.theta, rotation)).field)
     clearance = Clearance(surface, aligner.rims)
+    rotation, shared = split_strong(surface, clearance, current.rotation, mesh.port)
+    if shared:
+        current = aligner.rotate(CrossField(current.theta, rotation)).field
     corners = np.flatnonzero(surface.boundary_vertex & np.isfinite(mesh.opening_angle))
     rotation, held = leave_corners(surface, clearance, current.rotation, wanted, corners, mesh.port)
     current = aligner.rotate(CrossField(current.theta, rotation)).field

@@ -12,7 +12,9 @@ the global frame: one real matrix with the real and imaginary part as two right-
 the frame of its edge, and K is the connection Laplacian (`connection`).
 
 It starts from the harmonic z.  In a component without boundary that is 0: there it starts from a mode of least energy, found by
-inverse iteration of ``K + M / area`` from random numbers.  Those of a sphere have eight zeros of index 1/4 and no other.
+inverse iteration of ``K + M / area`` from the three axes' projections on the tangent planes, ``sum over axes of (x_a + i y_a)^4``
+for an edge along x and y to the left of it.  On a sphere that is a mode, one of nine, and its zeros are the eight corners of a cube.
+A little noise keeps the iteration from a mode of higher energy where the axes are orthogonal to the lowest.
 
 Diffusion has no core size.  With a given epsilon it is the start for a minimisation of the energy itself (`ginzburg_landau`).
 """
@@ -34,6 +36,7 @@ __all__ = ["edge_angle", "from_angles", "smooth_field", "wrap"]
 _TIMES = ((0.01, 4), (0.001, 6))
 #: inverse iterations for a component without boundary
 _ITERATIONS = 12
+_NOISE = 1e-3
 
 
 def wrap(angle: Float) -> Float:
@@ -112,11 +115,21 @@ def _start(mesh: SurfaceMesh, along: ConnectionOperators, frame: Float, mass: Fl
     z = frame.copy()
     z[along.free] = lu.solve(load)
     if np.any(closed):
-        inner = np.random.default_rng(0).standard_normal((len(closed), 2))
+        inner = _axes(mesh)[along.free] + _NOISE * np.random.default_rng(0).standard_normal((len(closed), 2))
         for _ in range(_ITERATIONS):
             inner = lu.solve(np.where(closed[:, None], mass[along.free][:, None] * inner / np.abs(inner[closed]).max(), load))
         z[along.free] = inner
     return z
+
+
+def _axes(mesh: SurfaceMesh) -> Float:
+    """(e, 2) sum of the fourth powers of the axes' projections, in the frame of every edge that is not on the boundary."""
+    assert mesh.triangle_normal is not None
+    x = (mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]) / mesh.edge_length[:, None]
+    normal = mesh.triangle_normal[mesh.edge_half_edges // 3].sum(axis=1)
+    y = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], x)
+    z = ((x + 1j * y) ** 4).sum(axis=1)
+    return np.stack([z.real, z.imag], axis=1)
 
 
 def _unit(z: Float) -> Float:
