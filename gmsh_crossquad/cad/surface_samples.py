@@ -59,6 +59,13 @@ class SurfaceSamples:
     def _trees(self) -> dict[tuple[int, bool], tuple[Any, Int]]:
         return {}
 
+    @cached_property
+    def curvature(self) -> Float:
+        """(k,) greatest absolute principal curvature, scaled; 0 at poles."""
+        mean = np.einsum("ncc->n", self.turning)
+        squares = np.einsum("ncd,ncd->n", self.turning, self.turning)
+        return 0.5 * (np.abs(mean) + np.sqrt(np.maximum(2 * squares - mean**2, 0.0)))
+
     def nearest(self, face: Int, points: Float, k: int, regular: bool) -> Int:
         """The k nearest samples (n, k) of scaled points on faces, sorted; the farthest is repeated where there are fewer.
 

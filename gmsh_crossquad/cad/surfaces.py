@@ -65,6 +65,21 @@ class CadSurfaces:
         """Unit normals (n, 3) of every face at the points of its background mesh."""
         return tuple(self.normals(np.full(len(m.points), m.face), self.model.faces[m.face].world(m.points)) for m in self.meshes)
 
+    @cached_property
+    def seed_curvatures(self) -> tuple[Float, ...]:
+        """Greatest principal curvature (n,), scaled and absolute, of every face at the points of its background mesh.
+
+        0 on plane faces and on those without a parametrization; at a pole or an apex that of the nearest point.
+        """
+        out = []
+        for m in self.meshes:
+            if self.curved[m.face] and self._facets[m.face] is None:
+                near = self._samples.nearest(np.full(len(m.points), m.face), m.points, 1, True)[:, 0]
+                out.append(self._samples.curvature[near])
+            else:
+                out.append(np.zeros(len(m.points)))
+        return tuple(out)
+
     def feet(self, face: Int, points: Float) -> Float:
         """Nearest points on faces.
 
