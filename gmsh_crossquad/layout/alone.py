@@ -65,10 +65,11 @@ def divisible(
         if has_divisions(model, mesh, found):
             return other, found
     loops = SurfaceMesh(mesh.points, mesh.triangles).loops
-    worst = int(np.argmax(np.abs(aligned.flux)))
+    worst = int(np.argmax(np.abs(aligned.flux))) if loops else -1
+    around = f" (flux {aligned.flux[worst]:.3g} around a boundary loop)" if loops else ""
     raise LayoutError(
-        f"no layout of the cross field has integer divisions (flux {aligned.flux[worst]:.3g} around a boundary loop)",
+        f"no layout of the cross field has integer divisions{around}",
         entity=(2, model.faces[mesh.face].tag),
-        location=mesh.points[loops[worst][0]],
+        location=mesh.points[loops[worst][0] if loops else 0],
         remedy="change the singularities or boundary indices",
     )

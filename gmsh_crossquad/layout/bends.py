@@ -16,7 +16,7 @@ import numpy as np
 
 from ..records import Float
 
-__all__ = ["bend", "middle", "turning", "vertex_normals"]
+__all__ = ["bend", "middle", "resampled", "turning", "vertex_normals"]
 
 LONG_TURN = np.radians(120.0)
 CROSS_TURN = np.radians(50.0)

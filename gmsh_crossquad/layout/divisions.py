@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
+from .arc_bends import arc_bends
 from .chords import Chords
 
 __all__ = ["ChordDivisions", "Segments", "chord_divisions", "segments"]
@@ -21,6 +22,8 @@ __all__ = ["ChordDivisions", "Segments", "chord_divisions", "segments"]
 GUIDE_TURN = np.radians(35.0)
 TURN = np.radians(15.0)
 STEEPEST = np.radians(40.0)
+GUIDE_BEND = np.radians(30.0)
+BEND = np.radians(45.0)
 LONGEST = 1.6
 SHORT = 0.3
 
@@ -35,12 +38,15 @@ class Segments:
     length : (s,) float64, scaled
     turning : (s,) float64
         Total turning of the CAD curve along the segment, radians; 0 inside faces.
+    bend : (s,) float64
+        Turning of the segment inside a curved face, radians; 0 elsewhere.
     """
 
     chord: Int
     arc: Int
     length: Float
     turning: Float
+    bend: Float
 
 
 @dataclass(frozen=True)
@@ -65,7 +71,7 @@ def segments(model: Model, tmesh: TMesh, divisions: Int, chords: Chords) -> Segm
     length = tmesh.length[arc] / divisions[arc]
     low = tmesh.arc_start[arc] + within * length
     high = low + length
-    turning = np.zeros(len(arc))
+    turned = np.zeros(len(arc))
     first = np.concatenate([[0], np.cumsum(divisions)])
     for curve, pieces in zip(model.curves, tmesh.pieces):
         # arcs of no divisions are shared by the segments beside them
@@ -75,9 +81,20 @@ def segments(model: Model, tmesh: TMesh, divisions: Int, chords: Chords) -> Segm
             low[mine] = np.concatenate([[0.0], middle])
             high[mine] = np.concatenate([middle, [curve.length]])
             s, total = cumulative_turning(curve.points, curve.arclength)
-            turning[mine] = np.interp(high[mine], s, total) - np.interp(low[mine], s, total)
+            turned[mine] = np.interp(high[mine], s, total) - np.interp(low[mine], s, total)
     on_curve = tmesh.arc_curve[arc] >= 0
-    return Segments(chord, arc, np.where(on_curve, high - low, length), turning)
+    return Segments(chord, arc, np.where(on_curve, high - low, length), turned, _bends(model, tmesh, divisions))
+
+
+def _bends(model: Model, tmesh: TMesh, divisions: Int) -> Float:
+    """Turning (s,) of the unit segments inside curved faces."""
+    first = np.concatenate([[0], np.cumsum(divisions)])
+    out = np.zeros(int(first[-1]))
+    for arc, total in arc_bends(model, tmesh).items():
+        n = int(divisions[arc])
+        at = np.interp(np.arange(n + 1) / max(n, 1), np.arange(len(total)) / (len(total) - 1), total)
+        out[first[arc] : first[arc + 1]] = np.diff(at)
+    return out
 
 
 def cumulative_turning(points: Float, arclength: Float) -> tuple[Float, Float]:
@@ -124,10 +141,10 @@ def chord_divisions(
     """
     seg = segments(model, tmesh, divisions, chords)
     local = size[seg.arc]
-    guide, _ = _wanted(model, tmesh, seg, chords.n, np.maximum(local, guide_size), GUIDE_TURN, capped)
+    guide, _ = _wanted(model, tmesh, seg, chords.n, np.maximum(local, guide_size), GUIDE_TURN, GUIDE_BEND, capped)
     if finer is not None:
         guide = np.maximum(guide, finer)
-    total, least = _wanted(model, tmesh, seg, chords.n, local, TURN, capped)
+    total, least = _wanted(model, tmesh, seg, chords.n, local, TURN, BEND, capped)
     fine = np.maximum(np.maximum(1, np.round(total / guide)), np.ceil(least / guide - 1e-9)).astype(np.int64)
     prescribed = {c: len(k.spacing) - 1 for c, k in enumerate(model.curves) if k.spacing is not None}
     if prescribed:
@@ -135,31 +152,30 @@ def chord_divisions(
     return ChordDivisions(guide, fine)
 
 
-def _largest(tmesh: TMesh, seg: Segments, n: int, values: Float) -> Float:
-    """Largest value per chord over its segments on curves, rounded up."""
+def _largest(seg: Segments, n: int, values: Float) -> Float:
+    """Largest value per chord over its segments, rounded up."""
     out = np.zeros(n)
-    np.maximum.at(out, seg.chord, np.where(tmesh.arc_curve[seg.arc] >= 0, values, 0.0))
+    np.maximum.at(out, seg.chord, values)
     return np.ceil(out - 1e-9)
 
 
-def _wanted(model: Model, tmesh: TMesh, seg: Segments, n: int, size: Float, turn: float, capped: bool) -> tuple[Int, Int]:
+def _wanted(
+    model: Model, tmesh: TMesh, seg: Segments, n: int, size: Float, turn: float, bend: float, capped: bool
+) -> tuple[Int, Int]:
     """Divisions per chord for edges of the given size (s,) along the segments, and those that the curves ask for at least.
 
-    The geometric mean over the chord's segments, raised where edges on a curve would turn much, capped by the short
-    curves that the chord ends on, and raised again where edges on a curve would be long or hardly follow it.
+    The geometric mean over the chord's segments, raised where edges on a curve or in a curved face would turn much, capped by
+    the short curves that the chord ends on, and raised again where edges would be long on a curve or hardly follow their shape.
     """
     ratio = np.log(np.maximum(seg.length / size, SHORT))
     mean = np.exp(np.bincount(seg.chord, ratio, minlength=n) / np.maximum(np.bincount(seg.chord, minlength=n), 1))
-
-    def largest(values: Float) -> Float:
-        return _largest(tmesh, seg, n, values)
-
+    long = _largest(seg, n, np.where(tmesh.arc_curve[seg.arc] >= 0, seg.length / (LONGEST * size), 0.0))
     caps = _caps(model, tmesh, seg, n, size)
-    least = np.maximum(np.minimum(largest(seg.turning / turn), caps), largest(seg.turning / STEEPEST))
+    least = np.minimum(_largest(seg, n, np.maximum(seg.turning / turn, seg.bend / bend)), caps)
+    least = np.maximum(least, _largest(seg, n, np.maximum(seg.turning / STEEPEST, seg.bend / BEND)))
     if not capped:
-        least = np.maximum(least, largest(seg.length / (LONGEST * size)))
-    wanted = np.maximum(np.round(mean), largest(seg.length / (LONGEST * size)))
-    wanted = np.minimum(np.maximum(1, wanted), caps)
+        least = np.maximum(least, long)
+    wanted = np.minimum(np.maximum(1, np.maximum(np.round(mean), long)), caps)
     return np.maximum(wanted, least).astype(np.int64), least.astype(np.int64)
 
 

@@ -4,11 +4,12 @@
     equal sums on opposite sides of every patch, every open CAD curve >= 1, closed curve >= 3, boundary loop >= 3,
     separation cuts (modules `cuts`, `handles`), found lazily; shifts between the sides of thin strips cost (module `alignment`).
 
-t_a is the arc's length over the wanted block size.  The cost is the factor by which edges miss their size,
-f(n) = t/n - 1 for 1 <= n <= t, (n - t) / max(t, 1/2) for n > t, and f(0) = 2 t: convex.  It is taken piecewise linear with
-kinks at integers, n = floor(t) + u + e - d_1 - d_2 - ...; f is exact at floor(t), floor(t) + 1 and above, and at floor(t)
-halved again and again.  Every column then meets at most two patch rows with coefficients +-1, the matrix of a bidirected flow,
-whose linear relaxation has half-integral vertices (Heistermann, Warnett, Bommes 2023): little is left to branch and bound.
+t_a is the arc's length over the wanted block size, but at least one division per 90 degrees of turning inside a curved face.
+The cost is the factor by which edges miss their size, f(n) = t/n - 1 for 1 <= n <= t, (n - t) / max(t, 1/2) for n > t, and
+f(0) = 2 t: convex.  It is taken piecewise linear with kinks at integers, n = floor(t) + u + e - d_1 - d_2 - ...; f is exact at
+floor(t), floor(t) + 1 and above, and at floor(t) halved again and again.  Every column then meets at most two patch rows with
+coefficients +-1, the matrix of a bidirected flow, whose linear relaxation has half-integral vertices (Heistermann, Warnett,
+Bommes 2023): little is left to branch and bound.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import scipy.sparse as sp
 from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
 from .alignment import alignment
+from .arc_bends import arc_bends
 from .cuts import Cut, separation_cuts
 from .handles import handle_cuts, homology
 from .integer_program import IntegerProgram
@@ -30,6 +32,7 @@ from .quotient import quotient
 __all__ = ["Quantization", "quantize"]
 
 MAX_ROUNDS = 60
+BEND = np.radians(90.0)
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,9 @@ def quantize(
         No divisions exist that meet all conditions.
     """
     n_arcs = len(tmesh.length)
-    target = np.asarray(target, float)
+    target = np.array(target, float)
+    for bent, turn in arc_bends(model, tmesh).items():
+        target[bent] = max(target[bent], turn[-1] / BEND)
     floor = np.floor(target)
     largest = 4.0 * max(float(target.max(initial=0.0)), 10.0) + 20.0 + len(model.curves)  # opposite a run of short curves
     arc, step, cost, upper = _columns(target, largest)
