@@ -49,7 +49,7 @@ def test_curvatures() -> None:
     with shape(GEO["in sphere"]):  # where Gmsh itself is wrong
         model, meshes = records([1])
         (curvature,) = CadSurfaces(model, meshes).seed_curvatures
-        np.testing.assert_allclose(curvature / SCALE, 1.0, rtol=1e-3)
+        np.testing.assert_allclose(curvature / SCALE, 1.0, rtol=5e-3)
     with shape(OCC["cone"]):
         tag = curved_tag()
         model, meshes = records([tag])

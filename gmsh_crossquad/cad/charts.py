@@ -140,8 +140,9 @@ class Charts:
             v = np.arctan2(np.sin(v), np.cos(v))
             over = np.abs(v) > 0.5 * np.pi
             v = np.where(over, np.copysign(np.pi, v) - v, v)
-            low = self.low[face[ball], 0]
-            u = np.where(over | (u < low) | (u > low + 2 * np.pi), low + np.mod(u + np.pi * over - low, 2 * np.pi), u)
+            u = np.where(over, u + np.pi, u)
+            middle = self.low[face[ball], 0] + 0.5 * self.width[face[ball], 0]
+            u = np.where(over, u - 2 * np.pi * np.round((u - middle) / (2 * np.pi)), u)
             out[ball] = np.stack([u, v], axis=1)
         return out
 
