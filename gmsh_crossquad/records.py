@@ -100,6 +100,8 @@ class Face:
         Rows of `Model.curves` that lie inside the face (cracks, embedded lines).
     embedded_points : tuple of int
         Rows of `Model.vertices` inside the face that are on no curve of it.
+    area, extent : float, scaled
+        Of a curved face its area (by the built-in kernel an estimate) and the diagonal of its box; NaN on plane ones.
     """
 
     tag: int
@@ -108,6 +110,8 @@ class Face:
     loops: tuple[tuple[tuple[int, int], ...], ...]
     embedded_curves: tuple[int, ...] = ()
     embedded_points: tuple[int, ...] = ()
+    area: float = float("nan")
+    extent: float = float("nan")
 
     @property
     def curved(self) -> bool:

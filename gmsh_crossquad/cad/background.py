@@ -11,15 +11,15 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import MeshError
-from ..field.cut import cut_open
-from ..field.split import open_up
 from ..field.surface_mesh import SurfaceMesh
 from ..options import MeshOptions
 from ..records import FaceMesh, Float, Int, Model
 from . import session
 from .bounds import kept_bounds
 from .crossings import crossings, without_crossings
+from .curved_background import curved_meshes
 from .lips import coincident, merged, mirrored
+from .opened import opened
 from .outline import Outline, outline
 from .seeds import InnerPoints, inner_points
 from .spacing import curve_spacing, face_sizes
@@ -81,9 +81,24 @@ def face_meshes(
     FieldError
         For a seed on the boundary of its face.
     """
-    whole, shapes, merges = _outlines(model, spacing, inner_points(model, sizes, seeds))
-    with kept_bounds(), session.options(**OPTIONS):
-        made = [triangulate(*item) for item in zip(shapes, sizes.tolist(), [f.tag for f in model.faces], strict=True)]
+    points = inner_points(model, sizes, seeds)
+    rows = [row for row, face in enumerate(model.faces) if not face.curved]
+    out: dict[int, FaceMesh] = {}
+    with kept_bounds():
+        if rows:
+            out.update(zip(rows, _plane_meshes(model, rows, spacing, sizes, points), strict=True))
+        curved = [row for row in range(len(model.faces)) if row not in out]
+        out.update(zip(curved, curved_meshes(model, curved, spacing, sizes), strict=True))
+    return tuple(out[row] for row in range(len(model.faces)))
+
+
+def _plane_meshes(
+    model: Model, rows: list[int], spacing: tuple[Float, ...], sizes: Float, inner: tuple[InnerPoints, ...]
+) -> list[FaceMesh]:
+    """Background meshes of the plane faces `rows`."""
+    whole, shapes, merges = _outlines(model, rows, spacing, inner)
+    with session.options(**OPTIONS):
+        made = [triangulate(shape, float(sizes[r]), model.faces[r].tag) for shape, r in zip(shapes, rows, strict=True)]
     # everything that follows is done for all faces together
     offset = np.concatenate([[0], np.cumsum([len(p) for p, _ in made])])
     points = np.concatenate([p for p, _ in made])
@@ -92,45 +107,25 @@ def face_meshes(
     vertex = np.full(len(points), -1)
     for shape, o in zip(shapes, offset):
         vertex[o : o + len(shape.vertex)] = shape.vertex
-    triangles, source = cut_open(triangles, len(points), cuts)
-    on_boundary = SurfaceMesh(points[source], triangles).boundary_vertex
-    points, triangles = open_up(points[source], triangles, on_boundary & (vertex[source] >= 0))
-    source = np.concatenate([source, np.full(len(points) - len(source), -1)])
-    owner = np.full(len(points), -1)
-    old = source >= 0
-    owner[old] = np.searchsorted(offset, source[old], side="right") - 1
-    triangle_owner = owner[triangles].max(axis=1)
-    while (triangle_owner < 0).any():  # new points belong to the face of their triangles; each round reaches the next ones
-        known = triangle_owner >= 0
-        owner[triangles[known]] = triangle_owner[known, None]
-        triangle_owner = owner[triangles].max(axis=1)
-    owner[triangles] = triangle_owner[:, None]
     out = []
-    order = np.argsort(owner, kind="stable")
-    local = np.empty(len(points), np.int64)
-    bounds = np.searchsorted(owner[order], np.arange(len(shapes) + 1))
-    for row in range(len(shapes)):
-        mine = order[bounds[row] : bounds[row + 1]]
-        local[mine] = np.arange(len(mine))
-        inside = np.where(source[mine] >= 0, source[mine] - offset[row], -1)
-        mesh = SurfaceMesh(points[mine], local[triangles[triangle_owner == row]])
-        out.append(_face_mesh(model, row, whole[row], merges[row], mesh, inside))
-    return tuple(out)
+    for k, (mesh, source) in enumerate(opened(points, triangles, cuts, vertex, offset)):
+        out.append(_face_mesh(model, rows[k], whole[k], merges[k], mesh, source))
+    return out
 
 
 def _outlines(
-    model: Model, spacing: tuple[Float, ...], inner: tuple[InnerPoints, ...]
+    model: Model, rows: list[int], spacing: tuple[Float, ...], inner: tuple[InnerPoints, ...]
 ) -> tuple[list[Outline], list[Outline], list[Int]]:
-    """Outlines of all faces, whole and merged, with the merged points; curves whose segments cross others get more nodes."""
+    """Outlines of the faces `rows`, whole and merged, with the merged points; curves that cross others get more nodes."""
     doubled = coincident(model)
     bad: list[tuple[int, Outline, Int]] = []
     for _ in range(CROSSING_ROUNDS + 1):
         for _, shape, pairs in bad:
             spacing = without_crossings(spacing, shape, pairs)
         nodes = mirrored(model, spacing, doubled)
-        whole = [outline(model, row, nodes, inner[row]) for row in range(len(model.faces))]
+        whole = [outline(model, row, nodes, inner[row]) for row in rows]
         shapes, merges = zip(*(merged(shape, doubled) for shape in whole), strict=True)
-        found = [(row, shape, crossings(shape)) for row, shape in enumerate(shapes)]
+        found = [(row, shape, crossings(shape)) for row, shape in zip(rows, shapes, strict=True)]
         bad = [item for item in found if len(item[2])]
         if not bad:
             return whole, list(shapes), list(merges)

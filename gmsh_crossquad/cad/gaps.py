@@ -3,7 +3,8 @@
 The middles of all cells of a face are joined by a Delaunay triangulation; its edges lead from every boundary part to the nearest
 ones all round.  An edge spans a *gap* where it leaves its cells into the face and where the boundary between them is much longer
 than the edge.  The width is the distance of the two cells as straight segments, so that it is right for coarse cells, too.
-All faces are triangulated at once: each is scaled to the unit square and put into a place of its own in a grid.
+All plane faces are triangulated at once: each is scaled to the unit square and put into a place of its own in a grid.  In a
+curved face the neighbours of a cell are the nearest ones in space, on whatever side.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from .cells import Cells
 __all__ = ["Neighbours", "Uses", "neighbours"]
 
 TOUCHING = 1e-9  # of the model
+NEAREST = 12  # cells of a curved face that are looked at from each
 FOLD = 0.55  # an edge shorter than this part of the boundary between its ends is no neighbour along the boundary
 
 
@@ -102,8 +104,6 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
     cells : Cells
     uses : Uses
     """
-    from ..spatial import Delaunay
-
     count = np.diff(cells.first)
     use = np.repeat(np.arange(len(uses.curve)), count[uses.curve])
     begin = np.concatenate([[0], np.cumsum(count[uses.curve])[:-1]])
@@ -124,7 +124,8 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
         p, q = np.concatenate([p, model.vertices[pv]]), np.concatenate([q, model.vertices[pv]])
     around = np.concatenate([uses.around, np.full(len(points), np.inf)])
 
-    axes = np.stack([f.axes for f in model.faces])
+    curved = np.array([f.curved for f in model.faces])
+    axes = np.stack([np.zeros((2, 3)) if f.curved else f.axes for f in model.faces])
     origin = np.stack([f.origin for f in model.faces])
 
     def local(x: Float) -> Float:
@@ -136,31 +137,27 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
     xy = 0.5 * (a + b)
 
-    order = np.argsort(face, kind="stable")
-    starts = np.searchsorted(face[order], np.arange(len(model.faces)))
-    low, high = np.minimum.reduceat(xy[order], starts), np.maximum.reduceat(xy[order], starts)
-    columns = int(np.ceil(np.sqrt(len(model.faces))))
-    slot = np.stack(np.divmod(np.arange(len(model.faces)), columns), axis=1) * 3.0
-    unit = (xy - low[face]) / (high - low).max(axis=1)[face][:, None] + slot[face]
-
-    triangles = Delaunay(unit).simplices.astype(np.int64)
-    half = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    key = np.unique(half.min(axis=1) * len(unit) + half.max(axis=1))
-    i, j = np.divmod(key, len(unit))
+    i, j = (np.concatenate(ends) for ends in zip(_plane_pairs(xy, face, curved), _curved_pairs(p, q, face, curved)))
     keep = (face[i] == face[j]) & (cell[i] != cell[j])
     i, j = i[keep], j[keep]
 
+    bent = curved[face[i]]
     d = xy[j] - xy[i]
-    size = np.maximum(np.linalg.norm(d, axis=1), 1e-300)
+    size = np.linalg.norm(d, axis=1)
+    size[bent] = 0.5 * np.linalg.norm((p + q)[j[bent]] - (p + q)[i[bent]], axis=1)
+    size = np.maximum(size, 1e-300)
     out_i, out_j = np.einsum("ij,ij->i", d, normal[i]), -np.einsum("ij,ij->i", d, normal[j])
     opposed = np.einsum("ij,ij->i", normal[i], normal[j]) < -0.5
     inward = (out_i > np.where(opposed, 1e-9, 0.2) * size) | (sign[i] == 0)
     inward &= (out_j > np.where(opposed, 1e-9, 0.2) * size) | (sign[j] == 0)
     along = np.abs(place[i] - place[j])
     along = np.minimum(along, around[loop[i]] - along)
+    inward |= bent
     facing = inward & ((loop[i] != loop[j]) | (size < FOLD * along))
     gap = np.full(len(i), np.inf)
-    gap[facing] = _segment_distance(a[i[facing]], b[i[facing]], a[j[facing]], b[j[facing]])
+    flat, round_ = facing & ~bent, facing & bent
+    gap[flat] = _segment_distance(a[i[flat]], b[i[flat]], a[j[flat]], b[j[flat]])
+    gap[round_] = _segment_distance(p[i[round_]], q[i[round_]], p[j[round_]], q[j[round_]])
 
     gap[gap < TOUCHING] = np.inf  # a vertex in common, or the lips of a crack
 
@@ -169,3 +166,43 @@ def neighbours(model: Model, cells: Cells, uses: Uses) -> Neighbours:
     ei, ej = ends[cell[i]], ends[cell[j]]
     joined = (ei[:, :, None] == ej[:, None, :]).any(axis=(1, 2))
     return Neighbours(np.stack([cell[i], cell[j]], axis=1), size, gap, joined)
+
+
+def _plane_pairs(xy: Float, face: Int, curved: Bool) -> tuple[Int, Int]:
+    """Edges of a Delaunay triangulation of the cells of every plane face."""
+    from ..spatial import Delaunay
+
+    mine = np.flatnonzero(~curved[face])
+    if not len(mine):
+        return mine, mine
+    faces, row = np.unique(face[mine], return_inverse=True)
+    order = np.argsort(row, kind="stable")
+    starts = np.searchsorted(row[order], np.arange(len(faces)))
+    points = xy[mine]
+    low, high = np.minimum.reduceat(points[order], starts), np.maximum.reduceat(points[order], starts)
+    columns = int(np.ceil(np.sqrt(len(faces))))
+    slot = np.stack(np.divmod(np.arange(len(faces)), columns), axis=1) * 3.0
+    unit = (points - low[row]) / (high - low).max(axis=1)[row][:, None] + slot[row]
+    triangles = Delaunay(unit).simplices.astype(np.int64)
+    half = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    key = np.unique(half.min(axis=1) * len(unit) + half.max(axis=1))
+    i, j = np.divmod(key, len(unit))
+    return mine[i], mine[j]
+
+
+def _curved_pairs(p: Float, q: Float, face: Int, curved: Bool) -> tuple[Int, Int]:
+    """Nearest cells in space of the cells of every curved face."""
+    from ..spatial import cKDTree
+
+    first, second = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for f in np.flatnonzero(curved).tolist():
+        mine = np.flatnonzero(face == f)
+        if len(mine) < 2:
+            continue
+        middle = 0.5 * (p[mine] + q[mine])
+        near = np.asarray(cKDTree(middle).query(middle, k=min(NEAREST, len(mine)))[1])[:, 1:]
+        i, j = np.repeat(mine, near.shape[1]), mine[near.ravel()]
+        pair = np.unique(np.minimum(i, j) * len(face) + np.maximum(i, j))
+        first.append(pair // len(face))
+        second.append(pair % len(face))
+    return np.concatenate(first), np.concatenate(second)

@@ -43,17 +43,19 @@ def curve_distance(model: Model, row: int, points: Float) -> tuple[Float, Int]:
     ----------
     model : Model
     row : int
-    points : (n, 2) float64
+    points : (n, 2) or (n, 3) float64
         Local coordinates.
 
     Returns
     -------
     distance : (n,) float64
     curve : (n,) int64
-        Row of the nearest curve.
+        Row of the nearest curve, -1 where the face has none.
     """
     face = model.faces[row]
     rows = list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
+    if not rows:
+        return np.full(len(points), np.inf), np.full(len(points), -1)
     lines = [face.local(model.curves[c].points) for c in rows]
     owner = np.repeat(rows, [len(line) - 1 for line in lines])
     a = np.concatenate([line[:-1] for line in lines])

@@ -12,7 +12,6 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from ..errors import GeometryError
 from ..records import Float
 from .session import gmsh_errors
 
@@ -22,8 +21,8 @@ FLATNESS = 1e-6  # of the model
 GRID = 9  # interior evaluations per direction
 
 
-def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> tuple[Float, Float]:
-    """Frame of a planar face.
+def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> tuple[Float, Float] | None:
+    """Frame of a planar face; None where the face is curved.
 
     Parameters
     ----------
@@ -41,10 +40,6 @@ def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> 
     axes : (2, 3) float64
         Their cross product is the CAD normal.
 
-    Raises
-    ------
-    GeometryError
-        Where the face is not planar.
     """
     points = np.concatenate(boundary)
     centre = 0.5 * (points.min(0) + points.max(0))
@@ -53,10 +48,11 @@ def face_plane(tag: int, boundary: list[Float], origin: Float, scale: float) -> 
     if area < 1e-6 * extent**2:
         fitted = np.linalg.svd(points - centre, full_matrices=False)[2][2]
         normal = fitted if fitted @ normal >= 0 else -fitted
-    _check_flat(tag, points, normal, origin, scale)
     kind = gmsh.model.getType(2, tag)
-    if kind != "Plane":
-        _check_flat(tag, np.concatenate([points, (_inside(tag, kind) - origin) / scale]), normal, origin, scale)
+    if not _flat(points, normal):
+        return None
+    if kind != "Plane" and not _flat(np.concatenate([points, (_inside(tag, kind) - origin) / scale]), normal):
+        return None
     side = _side(tag, kind)
     if side is not None and side @ normal < 0:
         normal = -normal
@@ -80,17 +76,9 @@ def _axes(normal: Float) -> Float:
     return np.stack([first, np.cross(normal, first)])
 
 
-def _check_flat(tag: int, points: Float, normal: Float, origin: Float, scale: float) -> None:
+def _flat(points: Float, normal: Float) -> bool:
     height = (points - points.mean(0)) @ normal
-    height -= 0.5 * (height.min() + height.max())
-    worst = int(np.argmax(np.abs(height)))
-    if abs(height[worst]) > FLATNESS:
-        raise GeometryError(
-            "the face is not planar",
-            entity=(2, tag),
-            location=origin + scale * points[worst],
-            remedy="only planar faces can be meshed; split it into flat pieces or leave it out of the physical surfaces",
-        )
+    return bool(0.5 * np.ptp(height) <= FLATNESS)
 
 
 def _inside(tag: int, kind: str) -> Float:

@@ -15,6 +15,7 @@ import numpy as np
 from ..errors import GeometryError
 from ..options import MeshOptions
 from ..records import Curve, Face, Float, Model
+from .curved_face import curved_face, seams
 from .knots import untie
 from .loops import boundary_loops
 from .plane import face_plane
@@ -26,6 +27,7 @@ from .transfinite import transfinite_parameters
 __all__ = ["read_model"]
 
 CONVEX = ("Line", "Circle", "Ellipse")  # cannot meet themselves
+NEARLY_FLAT = 1e-2  # height over extent of the boundary of a plane surface that is meshed as a curved one
 COINCIDENT = 1e-12  # of the model: shorter closed curves are degenerate
 
 
@@ -76,7 +78,7 @@ def read_model(options: MeshOptions) -> Model:
     Raises
     ------
     GeometryError
-        No surfaces, a face that is not planar, a boundary that does not close.
+        No surfaces, a plane face that is not planar, a boundary that does not close.
     MeshError
         Where Gmsh fails on an entity.
     """
@@ -87,7 +89,7 @@ def read_model(options: MeshOptions) -> Model:
         bounds = {f: [abs(c) for c in signs[f]] for f in tags}
         embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
     for f in tags:
-        if not bounds[f]:
+        if not bounds[f] and gmsh.model.getType(2, f) == "Discrete surface":
             remedy = "gmsh.model.mesh.createTopology() makes the boundaries of a mesh"
             raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
     inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
@@ -108,6 +110,13 @@ def read_model(options: MeshOptions) -> Model:
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
     kept = [r for r in raw if not _degenerate(r, scale)]
+    planes = _planes(tags, signs, {r.tag: r.points for r in kept}, origin, scale)
+    needed = {abs(int(c)) for d, t in gmsh.model.getPhysicalGroups(1) for c in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
+    needed |= {c for f in tags for c in inside[f]}
+    left = seams(bounds, [f for f in tags if planes[f] is None], needed)
+    if left:
+        kept = [r for r in kept if r.tag not in left]
+        vertices, points = _needed_vertices(vertices, kept, points)
     spacing = transfinite_parameters(
         {r.tag: float(np.sqrt((np.diff(r.points, axis=0) ** 2).sum(1)).sum()) for r in kept},
         [r.tag for r in kept if r.ends[0] == r.ends[1]],
@@ -116,20 +125,14 @@ def read_model(options: MeshOptions) -> Model:
     curves = tuple(_curve(r, origin, scale, spacing.get(r.tag)) for r in kept)
     row = {c.tag: i for i, c in enumerate(curves)}
     place = np.array(vertices.points).reshape(-1, 3)
-    faces = tuple(
-        _face(
-            f,
-            [c for c in signs[f] if abs(c) in row],
-            [row[c] for c in inside[f] if c in row],
-            points[f],
-            curves,
-            row,
-            place,
-            origin,
-            scale,
-        )
-        for f in tags
-    )
+    faces = []
+    for f in tags:
+        bound, embed = [c for c in signs[f] if abs(c) in row], [row[c] for c in inside[f] if c in row]
+        plane = planes[f]
+        if plane is None:
+            faces.append(curved_face(f, bound, embed, points[f], curves, row, scale))
+        else:
+            faces.append(_face(f, bound, embed, points[f], curves, row, place, plane))
     groups = {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     groups_of = _group_names(2)
     asked = groups | {vertices.tags[p] for f in tags for p in points[f]}
@@ -141,7 +144,7 @@ def read_model(options: MeshOptions) -> Model:
         vertices=(place - origin) / scale,
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
-        faces=faces,
+        faces=tuple(faces),
         notes=tuple(f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied),
         point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
@@ -210,6 +213,44 @@ def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Cur
     return Curve(raw.tag, raw.ends[0], raw.ends[1], points, raw.parameters, arclength, spacing, tangents)
 
 
+def _planes(
+    tags: list[int], signs: dict[int, list[int]], points: dict[int, Float], origin: Float, scale: float
+) -> dict[int, tuple[Float, Float] | None]:
+    """Frames of the plane faces, None for curved ones; `points` are the samples of all curves of any length."""
+    out: dict[int, tuple[Float, Float] | None] = {}
+    for f in tags:
+        bound = [(points[abs(c)][:: 1 if c > 0 else -1] - origin) / scale for c in signs[f] if abs(c) in points]
+        plane = gmsh.model.getType(2, f) == "Plane"
+        if plane and not bound:
+            raise GeometryError("the surface has no boundary of any length", entity=(2, f), remedy="remove it")
+        out[f] = face_plane(f, bound, origin, scale) if bound else None
+        if plane and out[f] is None and _height(np.concatenate(bound)) > NEARLY_FLAT:
+            place = origin + scale * np.concatenate(bound).mean(axis=0)
+            remedy = "use a Surface instead of a Plane Surface, or draw its boundary in a plane"
+            raise GeometryError("the plane surface is not planar", entity=(2, f), location=place, remedy=remedy)
+    return out
+
+
+def _height(points: Float) -> float:
+    """Extent of points across their best plane, over that along it."""
+    spread = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
+    extent = np.ptp(spread, axis=0)
+    return float(extent[2] / max(extent[0], np.finfo(float).tiny))
+
+
+def _needed_vertices(
+    vertices: _Vertices, kept: list[_Raw], points: dict[int, list[int]]
+) -> tuple[_Vertices, dict[int, list[int]]]:
+    """The vertices at curves that are kept, and embedded points; the rows in `kept` are changed, those in `points` returned."""
+    used = sorted({v for r in kept for v in r.ends} | {v for rows in points.values() for v in rows})
+    new = {old: i for i, old in enumerate(used)}
+    tags = [vertices.tags[v] for v in used]
+    for r in kept:
+        r.ends = [new[v] for v in r.ends]
+    fewer = _Vertices(tags, [vertices.points[v] for v in used], {t: i for i, t in enumerate(tags) if t >= 0})
+    return fewer, {f: [new[v] for v in rows] for f, rows in points.items()}
+
+
 def _face(
     tag: int,
     signed: list[int],
@@ -218,15 +259,11 @@ def _face(
     curves: tuple[Curve, ...],
     row: dict[int, int],
     place: Float,
-    origin: Float,
-    scale: float,
+    plane: tuple[Float, Float],
 ) -> Face:
-    """The record of one face; `place` holds the vertices in the user's coordinates."""
+    """The record of a plane face; `place` holds the vertices in the user's coordinates."""
     rows = [row[abs(c)] for c in signed]
-    if not rows:
-        raise GeometryError("the surface has no boundary of any length", entity=(2, tag), remedy="remove it")
-    oriented = [(curves[r].points if c > 0 else curves[r].points[::-1]) for c, r in zip(signed, rows)]
-    centre, axes = face_plane(tag, oriented, origin, scale)
+    centre, axes = plane
     face = Face(tag, centre, axes, ())
     flat = {r: face.local(curves[r].points) for r in dict.fromkeys(rows)}
     loops, both = boundary_loops(rows, curves, flat, tag, place)

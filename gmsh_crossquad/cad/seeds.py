@@ -102,7 +102,7 @@ def inner_points(model: Model, sizes: Float, seeds: tuple[Float, ...] | None = N
     """
     out = []
     for row, face in enumerate(model.faces):
-        own = np.zeros((0, 2)) if seeds is None else np.asarray(seeds[row], float).reshape(-1, 2)
+        own = np.zeros((0, len(face.axes))) if seeds is None else np.asarray(seeds[row], float).reshape(-1, len(face.axes))
         vertex = np.array([*face.embedded_points, *[-1] * len(own)], np.int64)
         points = np.concatenate([face.local(model.vertices[list(face.embedded_points)]), own])
         size = np.full(len(points), sizes[row])

@@ -62,6 +62,10 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
     divisions = max(FEW_DIVISIONS, DIVISIONS * min(1.0, float(np.sqrt(MANY / max(1, len(model.faces))))))
     wanted = max(FACE_TRIANGLES, TRIANGLES / len(model.faces))
     for row, face in enumerate(model.faces):
+        if face.curved:
+            even = np.sqrt(2.3 * face.area / wanted) if np.isfinite(face.area) else np.inf
+            out[row] = max(face.extent / divisions, min(face.extent / 8.0, even))
+            continue
         area, low, high = 0.0, np.full(len(DIRECTIONS), np.inf), np.full(len(DIRECTIONS), -np.inf)
         for loop in face.loops:
             for c, sign in loop:
@@ -99,6 +103,8 @@ def curve_spacing(
     """
     sizes = face_sizes(model, options) if sizes is None else sizes
     inner = inner_points(model, sizes) if inner is None else inner
+    if not model.curves:
+        return ()
     track, uses = Track(model), Uses.of(model)
     coarsest = np.full(len(model.curves), np.inf)
     np.minimum.at(coarsest, uses.curve, sizes[uses.face])
@@ -160,7 +166,10 @@ def _corners(model: Model) -> list[tuple[Int, Float]]:
             rows, signs = np.array(loop).T
             begin, end = np.where(signs > 0, 0, 1), np.where(signs > 0, 1, 0)
             outgoing, incoming = leave[rows, begin], np.roll(leave[rows, end], 1, axis=0)
-            cross = outgoing[:, 0] * incoming[:, 1] - outgoing[:, 1] * incoming[:, 0]
+            if face.curved:  # without the side of the face: the angle between the curves
+                cross = np.linalg.norm(np.cross(outgoing, incoming), axis=1)
+            else:
+                cross = outgoing[:, 0] * incoming[:, 1] - outgoing[:, 1] * incoming[:, 0]
             dot = np.einsum("ij,ij->i", outgoing, incoming)
             out.append((ends[rows, begin], np.mod(np.arctan2(cross, dot), 2 * np.pi)))
     return out

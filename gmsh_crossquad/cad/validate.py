@@ -141,7 +141,7 @@ def _too_sharp(model: Model, vertex: int, angle: float) -> None:
     tag = int(model.vertex_tags[vertex])
     raise GeometryError(
         f"the corner of {np.degrees(angle):.3g} degrees is too sharp",
-        entity=(0, tag) if tag > 0 else None,
+        entity=(0, tag) if tag >= 0 else None,
         location=_user(model, model.vertices[vertex]),
         remedy=f"open it to more than {np.degrees(SHARPEST):g} degrees",
     )

@@ -1,0 +1,314 @@
+"""Triangulate the curved faces of the current Gmsh model.
+
+Gmsh meshes them where they are, with everything it knows about seams, poles and trimmed parameter planes.  The nodes on the
+curves are given and put there first; Gmsh meshes only what is still empty: seams, then the faces.  Plane faces are hidden
+meanwhile.  The user's mesh and the visibility of entities are put back.  A face where the mesh does not have the given nodes on
+its boundary, is no manifold or has the wrong Euler characteristic is made again with another algorithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import gmsh
+import numpy as np
+
+from ..errors import MeshError
+from ..records import Bool, Float, Int, Model
+from . import session
+from .sample import evaluate
+
+__all__ = ["CurvedMesh", "triangulate_curved"]
+
+ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt
+PER_TURN = 20  # triangles per full turn of the surface
+MOST_TRIANGLES, FEW_TRIANGLES = 20_000.0, 600.0  # in the model, and of a face of a large one, because of curvature
+POINT, LINE, TRIANGLE, QUAD = 15, 1, 2, 3
+OPTIONS: dict[str, float] = {
+    "Mesh.AlgorithmSwitchOnFailure": 1,
+    "Mesh.ElementOrder": 1,
+    "Mesh.IgnorePeriodicity": 1,
+    "Mesh.MaxNumThreads1D": 1,
+    "Mesh.MaxNumThreads2D": 1,
+    "Mesh.MeshOnlyEmpty": 1,
+    "Mesh.MeshOnlyVisible": 1,
+    "Mesh.MeshSizeExtendFromBoundary": 1,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MeshSizeFromCurvature": PER_TURN,
+    "Mesh.MeshSizeFromParametricPoints": 0,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeMax": 1e22,
+    "Mesh.MeshSizeMin": 0,
+    "Mesh.Optimize": 0,
+    "Mesh.RandomFactor": 1e-9,
+    "Mesh.RandomSeed": 1,
+    "Mesh.RecombineAll": 0,
+    "Mesh.Renumber": 0,
+    "Mesh.SaveAll": 0,
+    "Mesh.Smoothing": 1,
+    "Mesh.SubdivisionAlgorithm": 0,
+    "General.AbortOnError": 0,
+    "General.Terminal": 0,
+}
+
+
+@dataclass(frozen=True)
+class CurvedMesh:
+    """Triangles of a curved face.
+
+    Attributes
+    ----------
+    points : (n, 3) float64, scaled
+    parameters : (n, 2) float64
+        NaN where Gmsh gives none.
+    triangles : (m, 3) int64
+        Oriented as the CAD normal.
+    vertex : (n,) int64
+        Row of `Model.vertices` or -1.
+    segments : (k, 2) int64; curve : (k,) int64; arclength : (k, 2) float64
+        Segments of all curves of the face, in the direction of their curve, as in `outline.Outline`.
+    """
+
+    points: Float
+    parameters: Float
+    triangles: Int
+    vertex: Int
+    segments: Int
+    curve: Int
+    arclength: Float
+
+
+@dataclass(frozen=True)
+class _Given:
+    """The nodes that are given: tags from 1 on, vertices first, then those inside every curve."""
+
+    first: Int  # tag of the first inner node of every curve
+    count: int
+
+    def chain(self, model: Model, row: int, nodes: int) -> Int:
+        """Tags of all `nodes` nodes of a curve."""
+        curve = model.curves[row]
+        inner = self.first[row] + np.arange(nodes - 2)
+        return np.concatenate([[curve.start + 1], inner, [curve.end + 1]])
+
+
+def triangulate_curved(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], sizes: Float) -> list[CurvedMesh]:
+    """Triangles of the faces `rows`.
+
+    Parameters
+    ----------
+    model : Model
+        Of the current Gmsh model.
+    rows : sequence of int
+        Curved faces.
+    spacing : tuple of (k + 1,) float64
+        Arc lengths of the nodes of every curve.
+    sizes : (f,) float64, scaled
+        Greatest size of triangles in every face.
+
+    Raises
+    ------
+    MeshError
+        Where no algorithm gives a valid mesh.
+    """
+    if not rows:
+        return []
+    done: dict[int, CurvedMesh] = {}
+    problem: dict[int, str] = {}
+    snapshot = session.MeshSnapshot.take()
+    try:
+        with session.options(**OPTIONS), _only([model.faces[r].tag for r in rows]):
+            for algorithm in ALGORITHMS:
+                todo = [r for r in rows if r not in done]
+                if not todo:
+                    break
+                with session.options(**{"Mesh.Algorithm": algorithm}):
+                    given = _generate(model, todo, spacing, sizes)
+                for row in todo:
+                    try:
+                        done[row] = _collect(model, row, spacing, given)
+                    except MeshError as error:
+                        problem[row] = error.what
+    finally:
+        snapshot.restore()
+    for row in rows:
+        if row not in done:
+            remedy = "check this surface in Gmsh: it must be able to triangulate it"
+            raise MeshError(
+                f"no valid background triangles ({problem[row]})", entity=(2, model.faces[row].tag), remedy=remedy
+            )
+    return [done[r] for r in rows]
+
+
+@contextmanager
+def _only(tags: Sequence[int]) -> Iterator[None]:
+    """Show these faces and their curves only."""
+    entities = gmsh.model.getEntities()
+    before = [gmsh.model.getVisibility(*e) for e in entities]
+    shown = {(2, t) for t in tags}
+    shown |= {(1, abs(c)) for t in tags for _, c in gmsh.model.getBoundary([(2, t)], combined=False, oriented=False)}
+    shown |= {e for t in tags for e in gmsh.model.mesh.getEmbedded(2, t)}
+    try:
+        for e in entities:
+            gmsh.model.setVisibility([e], int(e in shown or e[0] == 0))
+        yield
+    finally:
+        for e, value in zip(entities, before):
+            gmsh.model.setVisibility([e], value)
+
+
+def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], sizes: Float) -> _Given:
+    """Put the given nodes on the curves and let Gmsh mesh what is empty."""
+    mesh = gmsh.model.mesh
+    used = {c for r in rows for c in _curves(model, r)}
+    vertices = {v for c in used for v in (model.curves[c].start, model.curves[c].end)}
+    with session.gmsh_errors("preparing the background mesh"):
+        mesh.clear()
+        # vertices of the CAD that the model has left out get their node from Gmsh
+        for v in sorted(vertices):
+            tag = int(model.vertex_tags[v])
+            if tag >= 0:
+                point = model.vertices[v] * model.scale + model.origin
+                mesh.addNodes(0, tag, [v + 1], point)
+                mesh.addElementsByType(tag, POINT, [v + 1], [v + 1])
+        inner = np.array([len(s) - 2 for s in spacing], np.int64)
+        first = len(model.vertices) + 1 + np.cumsum(inner) - inner
+        given = _Given(first, len(model.vertices) + int(inner.sum()))
+        element = len(model.vertices) + 1
+        for c in sorted(used):
+            curve, s = model.curves[c], spacing[c]
+            tags = given.chain(model, c, len(s))
+            at = np.interp(s, curve.arclength, curve.parameters)
+            start = 0 if model.vertex_tags[curve.start] < 0 else 1
+            own = slice(start, -1)
+            if len(tags[own]):
+                mesh.addNodes(1, curve.tag, tags[own], evaluate(curve.tag, at[own]).ravel(), at[own])
+            ends = np.stack([tags[:-1], tags[1:]], axis=1)
+            mesh.addElementsByType(curve.tag, LINE, element + np.arange(len(ends)), ends.ravel())
+            element += len(ends)
+    limit, floor = _limits(model, rows, sizes)
+    least = min(limit.values()) if limit else 1.0
+    before = getattr(gmsh, "api_callback_", None)
+
+    def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
+        return min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least)) if dim == 2 else min(lc, least)
+
+    mesh.setSizeCallback(size)
+    try:
+        mesh.generate(1)
+        mesh.generate(2)
+    finally:
+        mesh.removeSizeCallback()
+        if before is not None:
+            gmsh.api_callback_ = before
+    return given
+
+
+def _limits(model: Model, rows: Sequence[int], sizes: Float) -> tuple[dict[int, float], dict[int, float]]:
+    """Greatest size of triangles by face tag, and the size below which the curvature of the surface counts no more."""
+    limit = {model.faces[r].tag: float(sizes[r]) * model.scale for r in rows}
+    most = max(MOST_TRIANGLES / len(model.faces), FEW_TRIANGLES)
+    floor = {model.faces[r].tag: float(np.sqrt(2.3 * model.faces[r].area / most)) * model.scale for r in rows}
+    return limit, {tag: min(size, limit[tag]) if np.isfinite(size) else 0.0 for tag, size in floor.items()}
+
+
+def _curves(model: Model, row: int) -> list[int]:
+    """Rows of the curves of a face, embedded ones included."""
+    face = model.faces[row]
+    return list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
+
+
+def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) -> CurvedMesh:
+    """The mesh that Gmsh made of a face, checked."""
+    face = model.faces[row]
+    with session.gmsh_errors("reading the background mesh", entity=(2, face.tag)):
+        triangles = _triangles(face.tag)
+        tags, coordinates, parameters = gmsh.model.mesh.getNodes(2, face.tag, includeBoundary=True, returnParametricCoord=True)
+    if not len(triangles):
+        raise MeshError("Gmsh made none")
+    tags, first = np.unique(np.asarray(tags, np.int64), return_index=True)
+    points = (np.asarray(coordinates).reshape(-1, 3)[first] - model.origin) / model.scale
+    uv = np.full((len(tags), 2), np.nan)
+    if len(parameters) == 2 * len(coordinates) // 3:
+        uv = np.asarray(parameters).reshape(-1, 2)[first]
+    used = np.unique(triangles)
+    place = np.searchsorted(tags, used)
+    if (tags[np.minimum(place, len(tags) - 1)] != used).any():
+        raise MeshError("a triangle has a node that is not of the face")
+    points, uv, tags = points[place], uv[place], used
+    triangles = np.searchsorted(tags, triangles)
+    vertex = np.where(tags <= len(model.vertices), tags - 1, -1)
+    segments, curve, arclength = [], [], []
+    for c in _curves(model, row):
+        s = spacing[c]
+        chain = given.chain(model, c, len(s))
+        place = np.searchsorted(tags, chain)
+        if (tags[np.minimum(place, len(tags) - 1)] != chain).any():
+            raise MeshError(f"nodes of curve {model.curves[c].tag} are missing")
+        segments.append(np.stack([place[:-1], place[1:]], axis=1))
+        curve.append(np.full(len(s) - 1, c))
+        arclength.append(np.stack([s[:-1], s[1:]], axis=1))
+    for v in face.embedded_points:
+        if not np.any(vertex == v):
+            raise MeshError("an embedded point is missing")
+    out = CurvedMesh(
+        points,
+        uv,
+        triangles,
+        vertex,
+        np.concatenate(segments) if segments else np.zeros((0, 2), np.int64),
+        np.concatenate(curve) if curve else np.zeros(0, np.int64),
+        np.concatenate(arclength) if arclength else np.zeros((0, 2)),
+    )
+    _check(out)
+    return out
+
+
+def _triangles(tag: int) -> Int:
+    """Triangles (m, 3) of a face, quads cut in two."""
+    out = []
+    types, _, nodes = gmsh.model.mesh.getElements(2, tag)
+    for kind, flat in zip(types, nodes):
+        if kind == TRIANGLE:
+            out.append(np.asarray(flat, np.int64).reshape(-1, 3))
+        elif kind == QUAD:
+            q = np.asarray(flat, np.int64).reshape(-1, 4)
+            out += [q[:, :3], q[:, [0, 2, 3]]]
+    return np.concatenate(out) if out else np.zeros((0, 3), np.int64)
+
+
+def _check(mesh: CurvedMesh) -> None:
+    """Every edge has two triangles, run both ways, or one and lies on a curve; curves are edges.
+
+    Raises
+    ------
+    MeshError
+    """
+    n = len(mesh.points)
+    half = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    directed, count = np.unique(half[:, 0] * n + half[:, 1], return_counts=True)
+    if (count > 1).any() or (half[:, 0] == half[:, 1]).any():
+        raise MeshError("the triangles are not oriented alike or fold back")
+    back = directed % n * n + directed // n
+    alone = directed[~np.isin(back, directed)]
+    ends = np.sort(mesh.segments, axis=1)
+    segment = ends[:, 0] * n + ends[:, 1]
+    lone = np.minimum(alone // n, alone % n) * n + np.maximum(alone // n, alone % n)
+    if not np.isin(lone, segment).all():
+        raise MeshError("a boundary edge is on no curve")
+    edges = np.unique(np.minimum(half[:, 0], half[:, 1]) * n + np.maximum(half[:, 0], half[:, 1]))
+    if not np.isin(segment, edges).all():
+        raise MeshError("a segment of a curve is no edge")
+
+
+def boundary_of(mesh: CurvedMesh) -> Bool:
+    """(k,) segments that have triangles on one side only."""
+    n = len(mesh.points)
+    half = np.stack([mesh.triangles, np.roll(mesh.triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    key = np.minimum(half[:, 0], half[:, 1]) * n + np.maximum(half[:, 0], half[:, 1])
+    values, count = np.unique(key, return_counts=True)
+    ends = np.sort(mesh.segments, axis=1)
+    out: Bool = count[np.searchsorted(values, ends[:, 0] * n + ends[:, 1])] == 1
+    return out
