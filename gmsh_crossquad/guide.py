@@ -19,6 +19,7 @@ from .layout.quantize import quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
+from .surfaces import Planes
 from .watch import Watch
 
 __all__ = ["GuideResult", "TooManyCells", "coarse_divisions", "smooth_guide"]
@@ -101,6 +102,7 @@ def smooth_guide(
     """
     with watch.stage("guide"):
         chords = find_chords(tmesh, quotient(tmesh, coarse))
+    surfaces = Planes(model)
     notes: list[str] = []
     finer: Int | None = None
     best: tuple[tuple[int, int, float], Guide, Int] | None = None
@@ -120,11 +122,11 @@ def smooth_guide(
             wrong = problems(model, tmesh, q)
             if wrong:
                 raise LayoutError(f"the guide grid is not valid ({wrong[0]})", remedy="another size may help")
-            start = place(model, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
+            start = place(model, surfaces, tmesh, q, tuple(_curve_fine(chords, divisions, pieces) for pieces in tmesh.pieces))
             coarse_chord = _coarse_chords(tmesh, q, chords, divisions)
             fine = divisions.fine[coarse_chord]
         with watch.stage("smooth"):
-            guide, report = smooth(start, model)
+            guide, report = smooth(start, model, surfaces)
         watch.work += report.starts * len(q.quads)
         bad = folded = report.inverted
         steep = np.zeros(0, np.int64)

@@ -13,6 +13,7 @@ from gmsh_crossquad.embed.quality import CHUNK, guide_quality, scaled_jacobian
 from gmsh_crossquad.embed.rest_lengths import SAGITTA, rest_lengths
 from gmsh_crossquad.embed.start import spread_chains
 from gmsh_crossquad.records import Float
+from gmsh_crossquad.surfaces import Planes
 from tests.smoothing_grids import ell, fold, mapped_grid, rectangle, ring, sector, shaken
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -111,8 +112,8 @@ GRIDS = {
 def test_gradient_of_a_grid(name: str, eps: float, power: int, amplitude: float) -> None:
     guide, model = GRIDS[name]
     guide = spread_chains(shaken(guide, model, amplitude, 4, slide=eps > 0), model, CurveTable(model.curves))
-    rest = rest_lengths(guide, model, CurveTable(model.curves))
-    grid = GridEnergy(guide, model, CurveTable(model.curves), rest)
+    rest = rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
+    grid = GridEnergy(guide, model, Planes(model), CurveTable(model.curves), rest)
     z = 0.01 * np.random.default_rng(1).normal(size=grid.size)
     energy, gradient = grid.value(z, rest.sides, eps, power)
     assert np.isfinite(energy)
@@ -128,8 +129,8 @@ def test_gradient_of_a_grid(name: str, eps: float, power: int, amplitude: float)
 
 def test_factor_solves_with_a_positive_definite_matrix() -> None:
     guide, model = GRIDS["fold"]
-    rest = rest_lengths(guide, model, CurveTable(model.curves))
-    grid = GridEnergy(guide, model, CurveTable(model.curves), rest)
+    rest = rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
+    grid = GridEnergy(guide, model, Planes(model), CurveTable(model.curves), rest)
     z = np.zeros(grid.size)
     solve = grid.factor(z, rest.sides, 0.0, 4)
     inverse = np.column_stack([solve(column) for column in np.eye(grid.size)])
@@ -139,7 +140,9 @@ def test_factor_solves_with_a_positive_definite_matrix() -> None:
 
 def test_zero_is_the_given_guide() -> None:
     guide, model = GRIDS["fold"]
-    grid = GridEnergy(guide, model, CurveTable(model.curves), rest_lengths(guide, model, CurveTable(model.curves)))
+    grid = GridEnergy(
+        guide, model, Planes(model), CurveTable(model.curves), rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
+    )
     points, arclength = grid.positions(np.zeros(grid.size))
     assert points == pytest.approx(guide.points, abs=1e-14)
     assert (arclength == guide.arclength).all()
@@ -179,7 +182,8 @@ def test_scaled_jacobian_in_chunks() -> None:
 
 
 def test_guide_quality_knows_the_planes_of_the_faces() -> None:
-    assert guide_quality(*fold(3, 2.0)) == pytest.approx(1.0)
+    guide, model = fold(3, 2.0)
+    assert guide_quality(guide, Planes(model)) == pytest.approx(1.0)
 
 
 def test_chain_terms_by_hand() -> None:
@@ -229,18 +233,23 @@ def test_rest_lengths_leave_no_bulge_beside_thin_cells() -> None:
     guide, model = mapped_grid(sector(1.0, 1.0 + height, 1.0), 1, 4)
     table = CurveTable(model.curves)
     for actual in (0.5, 1.0):
-        rest = rest_lengths(guide, model, table, actual=actual)
+        rest = rest_lengths(guide, model, Planes(model), table, actual=actual)
         limits = np.concatenate([t for t in rest.turns if len(t) == 4])
         assert limits == pytest.approx(np.sqrt(8 * SAGITTA * height), rel=2e-2)
-    assert all(np.isinf(t).all() for t in rest_lengths(guide, model, table).turns)
+    assert all(np.isinf(t).all() for t in rest_lengths(guide, model, Planes(model), table).turns)
     wide, wide_model = mapped_grid(sector(1.0, 2.0, 1.0), 1, 4)
-    assert all(np.isinf(t).all() for t in rest_lengths(wide, wide_model, CurveTable(wide_model.curves), actual=1.0).turns)
+    assert all(
+        np.isinf(t).all()
+        for t in rest_lengths(wide, wide_model, Planes(wide_model), CurveTable(wide_model.curves), actual=1.0).turns
+    )
 
 
 def test_chain_hessian_is_the_second_derivative_where_nothing_is_dropped() -> None:
     """The ordering term; the turning term for a constant rate."""
     guide, model = mapped_grid(sector(0.5, 1.0, 2.0), 1, 3)
-    grid = GridEnergy(guide, model, CurveTable(model.curves), rest_lengths(guide, model, CurveTable(model.curves)))
+    grid = GridEnergy(
+        guide, model, Planes(model), CurveTable(model.curves), rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
+    )
     chains = grid._chains
     s = np.array([0.3, 0.7, 0.6, 1.4])
     rate = np.array([2.0, 2.0, 1.0, 1.0])

@@ -13,6 +13,7 @@ from gmsh_crossquad.embed.quality import guide_quality
 from gmsh_crossquad.embed.smooth import smooth
 from gmsh_crossquad.embed.start import chain_arclengths
 from gmsh_crossquad.records import Float, Guide, Model
+from gmsh_crossquad.surfaces import Planes
 from tests.smoothing_grids import build, ell, fold, grid_quads, mapped_grid, moved, rectangle, ring, sector, segment, shaken
 
 GRIDS = {
@@ -46,9 +47,9 @@ def test_shaken_grids_come_back(name: str, amplitude: float) -> None:
     """Every one of these blocks has a grid of (nearly) right angles, and the optimum must be near it."""
     guide, model = GRIDS[name]
     start = shaken(guide, model, amplitude, 7, slide=amplitude > 0.1)
-    out, report = smooth(start, model)
+    out, report = smooth(start, model, Planes(model))
     check(out, model, start)
-    quality = guide_quality(out, model)
+    quality = guide_quality(out, Planes(model))
     assert report.min_scaled_jacobian == quality.min()
     assert len(report.inverted) == 0
     assert quality.min() > 0.95
@@ -58,7 +59,7 @@ def test_shaken_grids_come_back(name: str, amplitude: float) -> None:
 @given(seed=st.integers(0, 10_000))
 def test_any_tangle_of_a_convex_face_is_undone(seed: int) -> None:
     guide, model = GRIDS["square"]
-    out, report = smooth(shaken(guide, model, 1.0, seed), model)
+    out, report = smooth(shaken(guide, model, 1.0, seed), model, Planes(model))
     assert report.min_scaled_jacobian > 0.9
     assert out.points == pytest.approx(guide.points, abs=0.1)
 
@@ -67,7 +68,7 @@ def test_all_interior_vertices_in_one_point() -> None:
     guide, model = GRIDS["sector"]
     points = guide.points.copy()
     points[(guide.curve < 0) & ~guide.fixed] = [0.1, 0.2, 0.0]
-    out, report = smooth(replace(guide, points=points), model)
+    out, report = smooth(replace(guide, points=points), model, Planes(model))
     check(out, model, guide)
     assert report.min_scaled_jacobian > 0.95
 
@@ -78,14 +79,14 @@ def test_a_twisted_interior_is_undone() -> None:
     points = guide.points.copy()
     inner = (guide.curve < 0) & ~guide.fixed
     points[inner] = [1.0, 1.0, 0.0] - points[inner]
-    _, report = smooth(replace(guide, points=points), model)
+    _, report = smooth(replace(guide, points=points), model, Planes(model))
     assert report.min_scaled_jacobian > 0.95
     assert report.rounds > 0
 
 
 def test_an_even_rectangle_stays() -> None:
     guide, model = GRIDS["rectangle"]
-    out, report = smooth(guide, model)
+    out, report = smooth(guide, model, Planes(model))
     assert out.points == pytest.approx(guide.points, abs=1e-12)
     assert report.min_scaled_jacobian == pytest.approx(1.0, abs=1e-12)
     assert (report.rounds, report.start) == (0, "placed")
@@ -100,9 +101,9 @@ def test_smoothing_does_not_know_place_direction_and_unit(name: str, scale: floa
     matrix = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     rotation = np.eye(3) + np.sin(0.8) * matrix + (1 - np.cos(0.8)) * matrix @ matrix
     shift = scale * np.array([3.0, -1.0, 2.0])
-    one, _ = smooth(start, model)
+    one, _ = smooth(start, model, Planes(model))
     other_start, other_model = moved(start, model, rotation, shift, scale)
-    two, report = smooth(other_start, other_model)
+    two, report = smooth(other_start, other_model, Planes(other_model))
     check(two, other_model, other_start)
     assert len(report.inverted) == 0
     assert two.points / scale == pytest.approx((scale * one.points @ rotation.T + shift) / scale, abs=0.02)
@@ -111,7 +112,7 @@ def test_smoothing_does_not_know_place_direction_and_unit(name: str, scale: floa
 def test_smoothing_is_deterministic() -> None:
     guide, model = GRIDS["sector"]
     start = shaken(guide, model, 0.3, 5)
-    one, two = smooth(start, model)[0], smooth(start, model)[0]
+    one, two = smooth(start, model, Planes(model))[0], smooth(start, model, Planes(model))[0]
     assert (one.points == two.points).all()
 
 
@@ -129,8 +130,8 @@ def test_a_tiny_feature_is_untangled_too() -> None:
     size = np.linalg.norm(points[inner], axis=1)[:, None] * [0.4, 0.4, 0.0]
     points[inner] += size * random.normal(size=(len(inner), 3))
     start = replace(guide, points=points)
-    assert guide_quality(start, model)[: 6 * 6].min() < 0
-    out, report = smooth(start, model)
+    assert guide_quality(start, Planes(model))[: 6 * 6].min() < 0
+    out, report = smooth(start, model, Planes(model))
     check(out, model, guide)
     assert report.min_scaled_jacobian > 0.9
 
@@ -144,7 +145,7 @@ def test_edges_do_not_cut_off_the_tip_of_a_curve() -> None:
         return np.column_stack([r * np.cos(angle), (0.1 + u) * np.sin(angle), 0.0 * u])
 
     guide, model = mapped_grid(mapping, 5, 16)
-    out, report = smooth(guide, model)
+    out, report = smooth(guide, model, Planes(model))
     check(out, model, guide)
     assert report.min_scaled_jacobian > 0.3
     s = chain_arclengths(out, model, 3)
@@ -167,7 +168,7 @@ def test_edges_along_a_curve_are_graded() -> None:
     arclength = guide.arclength.copy()
     chain = guide.chains[0]
     arclength[chain[1:-1]] = [0.01, 0.02, 0.03, 0.04, 0.05]
-    out, report = smooth(replace(guide, arclength=arclength), model)
+    out, report = smooth(replace(guide, arclength=arclength), model, Planes(model))
     check(out, model, guide)
     for row in (0, 2):
         gap = np.diff(chain_arclengths(out, model, row))
@@ -180,7 +181,7 @@ def test_prescribed_places_on_a_curve_stay() -> None:
     fixed = guide.fixed.copy()
     fixed[guide.chains[1]] = True
     start = shaken(replace(guide, fixed=fixed), model, 0.3, 1)
-    out, report = smooth(start, model)
+    out, report = smooth(start, model, Planes(model))
     assert (out.arclength[guide.chains[1]] == start.arclength[guide.chains[1]]).all()
     check(out, model, start)
     assert report.min_scaled_jacobian > 0.9
@@ -191,7 +192,7 @@ def test_the_report_names_quads_that_cannot_be_untangled() -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0.25, 0.25, 0], [0, 1, 0]])
     chains = [([k, (k + 1) % 4], segment(points[k], points[(k + 1) % 4])) for k in range(4)]
     guide, model = build(points, grid_quads(1, 1)[:, [0, 1, 2, 3]] * 0 + [[0, 1, 2, 3]], chains)
-    out, report = smooth(guide, model)
+    out, report = smooth(guide, model, Planes(model))
     assert report.inverted.tolist() == [0]
     assert report.min_scaled_jacobian < 0
     assert (out.points == guide.points).all()
@@ -229,7 +230,7 @@ def test_minimise_with_a_wrong_matrix_and_a_barrier() -> None:
 def test_long_edges_shrink_towards_a_crowd_on_the_next_curve() -> None:
     """Forty edges on the left side of a square, three on the bottom: the outer ones of these grade down to the crowd."""
     guide, model = mapped_grid(rectangle(), 3, 40)
-    out, report = smooth(guide, model)
+    out, report = smooth(guide, model, Planes(model))
     check(out, model, guide)
     gap = np.diff(chain_arclengths(out, model, 0))
     assert gap[0] < 0.31
@@ -241,7 +242,7 @@ def test_the_laplace_start_takes_over(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without untangling rounds a tangled start is lost, and the uniform Laplace grid of a square is valid at once."""
     guide, model = GRIDS["square"]
     monkeypatch.setattr(smooth_module, "ROUNDS", 0)
-    out, report = smooth(shaken(guide, model, 1.0, 1), model)
+    out, report = smooth(shaken(guide, model, 1.0, 1), model, Planes(model))
     assert (report.start, report.rounds) == ("laplace", 0)
     assert report.min_scaled_jacobian > 0.99
     assert out.points == pytest.approx(guide.points, abs=0.01)
@@ -254,6 +255,6 @@ def test_sharpening_lifts_the_worst_corner(monkeypatch: pytest.MonkeyPatch) -> N
         return np.column_stack([u, v * (1 + 0.6 * np.cos(2 * np.pi * u)), 0.0 * u])
 
     guide, model = mapped_grid(mapping, 12, 8)
-    sharp = smooth(guide, model)[1].min_scaled_jacobian
+    sharp = smooth(guide, model, Planes(model))[1].min_scaled_jacobian
     monkeypatch.setattr(smooth_module, "WANTED", 0.0)
-    assert sharp > 1.2 * smooth(guide, model)[1].min_scaled_jacobian
+    assert sharp > 1.2 * smooth(guide, model, Planes(model))[1].min_scaled_jacobian

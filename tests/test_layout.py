@@ -18,6 +18,7 @@ from gmsh_crossquad.layout.quantize import quantize
 from gmsh_crossquad.layout.quotient import curve_chain, quotient
 from gmsh_crossquad.layout.verify import problems
 from gmsh_crossquad.quad_edges import edges_of_quads
+from gmsh_crossquad.surfaces import Planes
 from tests import tmeshes
 
 MODEL, TMESH = tmeshes.l_shape()
@@ -139,7 +140,7 @@ def test_contradicting_counts_are_named():
 
 def test_the_l_shape_has_three_blocks_and_straight_places():
     n = np.full(10, 2, np.int64)
-    guide = place(MODEL, TMESH, quotient(TMESH, n))
+    guide = place(MODEL, Planes(MODEL), TMESH, quotient(TMESH, n))
     assert guide.quad_block.max() + 1 == 3
     assert np.bincount(guide.quad_block).tolist() == [4, 4, 4]
     edge = guide.points[np.roll(guide.quads, -1, axis=1)] - guide.points[guide.quads]

@@ -14,6 +14,7 @@ from gmsh_crossquad.embed.start import LEAST_GAP, chain_arclengths, laplace_star
 from gmsh_crossquad.errors import MeshError
 from gmsh_crossquad.quad_edges import edges_of_quads
 from gmsh_crossquad.records import Float, Guide, Int, Model
+from gmsh_crossquad.surfaces import Planes
 from tests.smoothing_grids import curve_of, ell, fold, mapped_grid, rectangle, ring, sector, segment, shaken
 
 
@@ -119,16 +120,16 @@ def test_grid_edges() -> None:
 def test_laplace_start_restores_an_even_grid(make) -> None:  # type: ignore[no-untyped-def]
     """An affine grid solves the uniform Laplace equation."""
     guide, model = make()
-    again = laplace_start(shaken(guide, model, 5.0, 2), model, CurveTable(model.curves))
+    again = laplace_start(shaken(guide, model, 5.0, 2), model, Planes(model), CurveTable(model.curves))
     assert again.points == pytest.approx(guide.points, abs=1e-12)
 
 
 @pytest.mark.parametrize("make", [lambda: ring(3, 12, 0.5, 1.0), lambda: mapped_grid(sector(0.5, 1.0, 1.5), 4, 8)])
 def test_laplace_start_forgets_the_start(make) -> None:  # type: ignore[no-untyped-def]
     guide, model = make()
-    one, two = (laplace_start(shaken(guide, model, 1.0, seed), model, CurveTable(model.curves)) for seed in (1, 2))
+    one, two = (laplace_start(shaken(guide, model, 1.0, seed), model, Planes(model), CurveTable(model.curves)) for seed in (1, 2))
     assert one.points == pytest.approx(two.points, abs=1e-12)
-    assert guide_quality(one, model).min() > 0.5
+    assert guide_quality(one, Planes(model)).min() > 0.5
 
 
 def edge_lengths(guide: Guide, sides: Float) -> tuple[Int, Float]:
@@ -141,7 +142,7 @@ def edge_lengths(guide: Guide, sides: Float) -> tuple[Int, Float]:
 
 def test_rest_lengths_of_an_even_grid_are_its_edges() -> None:
     guide, model = mapped_grid(rectangle(3.0, 1.0), 6, 5)
-    rest = rest_lengths(guide, model, CurveTable(model.curves))
+    rest = rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
     assert rest.sides == pytest.approx(np.tile([[0.5], [0.2], [0.5], [0.2]], (1, 30)), rel=1e-12)
     assert rest.even == pytest.approx(np.sqrt(0.1), rel=1e-12)
     assert all(c == pytest.approx(gaps(guide, model, row), rel=1e-12) for row, c in enumerate(rest.chains))
@@ -153,7 +154,7 @@ def test_rest_lengths_fill_curves_and_faces(make, seed: int) -> None:  # type: i
     guide, model = make()
     random = np.random.default_rng(seed)
     guide = replace(guide, quad_size=guide.quad_size * np.exp(random.normal(size=guide.quad_size.shape)))
-    rest = rest_lengths(guide, model, CurveTable(model.curves))
+    rest = rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
     for curve, chain in zip(model.curves, rest.chains):
         assert chain.sum() == pytest.approx(curve.length, rel=1e-12)
     areas = 0.25 * (rest.sides[0] + rest.sides[2]) * (rest.sides[1] + rest.sides[3])
@@ -168,7 +169,7 @@ def test_a_thin_strip_in_the_layout_is_widened() -> None:
     guide, model = mapped_grid(rectangle(), 10, 10)
     size = guide.quad_size.copy()
     size[40:50, 0] /= 100.0
-    rest = rest_lengths(replace(guide, quad_size=size), model, CurveTable(model.curves))
+    rest = rest_lengths(replace(guide, quad_size=size), model, Planes(model), CurveTable(model.curves))
     edges, length = edge_lengths(guide, rest.sides)
     across = np.abs(guide.points[edges[:, 0], 1] - guide.points[edges[:, 1], 1]) < 1e-9
     inside = across & (guide.points[edges[:, 0], 1] > 0.05) & (guide.points[edges[:, 0], 1] < 0.95)
@@ -185,7 +186,7 @@ def test_a_short_curve_keeps_its_length_and_the_others_theirs() -> None:
         return np.column_stack([u, v * (0.001 + 0.999 * u), 0.0 * u])
 
     guide, model = mapped_grid(mapping, 8, 1)
-    rest = rest_lengths(guide, model, CurveTable(model.curves))
+    rest = rest_lengths(guide, model, Planes(model), CurveTable(model.curves))
     assert rest.chains[3] == pytest.approx([0.001], rel=1e-9)
     assert rest.chains[1] == pytest.approx([1.0], rel=1e-9)
     for row in (0, 2):
@@ -198,7 +199,7 @@ def test_a_chain_must_run_along_edges() -> None:
     chain = guide.chains[1][[0, 2, 1, 3, 4]]
     broken = replace(guide, chains=(guide.chains[0], chain, *guide.chains[2:]))
     with pytest.raises(MeshError, match="curve 2"):
-        rest_lengths(broken, model, CurveTable(model.curves))
+        rest_lengths(broken, model, Planes(model), CurveTable(model.curves))
 
 
 def test_limit_brings_neighbours_within_the_ratio() -> None:
@@ -222,6 +223,6 @@ def test_edges_are_shorter_where_a_curve_turns() -> None:
 
     guide, model = mapped_grid(nose, 3, 3)
     guide = replace(guide, quad_size=np.full_like(guide.quad_size, 0.5))
-    first, tip, last = rest_lengths(guide, model, CurveTable(model.curves)).chains[3]
+    first, tip, last = rest_lengths(guide, model, Planes(model), CurveTable(model.curves)).chains[3]
     assert tip < 0.8 * first
     assert last == pytest.approx(first)

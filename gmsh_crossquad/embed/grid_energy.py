@@ -2,11 +2,14 @@
 
 The coordinates z are relative to the local rest length l, so that small features weigh as much as large ones:
 
-    interior vertex    x = x0 + l (z_1 a_1 + z_2 a_2)        in the frame a of its face,
+    interior vertex    x = x0 + l (z_1 b_1 + z_2 b_2)        b: axes of its plane face, or of the tangent plane of a curved one,
     vertex on a curve  s = s0 + l z,   x = C(s)              in all its faces at once.
 
-The energy is that of the corners (`energy`) and of the edges on curves (`chain_energy`).  The Hessian is positive
-definite: it drops the curvature of the curves, and what the two modules drop.
+The energy is that of the corners (`energy`) and of the edges on curves (`chain_energy`).  A quad's corners are seen in a
+frame (o, a): that of its plane face, or on a curved face the tangent plane of the surface at the quad's middle.  A vertex seen
+in a frame is a *node*, with the plane coordinates y = a (x - o) and, on a curved face, dy/dz = l a b^T.  All frames are frozen;
+`positions` puts the vertices back on their surfaces.  The Hessian is positive definite: it drops the curvature of curves
+and surfaces, and what the two modules drop.
 """
 
 from __future__ import annotations
@@ -16,7 +19,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import MeshError
-from ..records import Float, Guide, Model
+from ..records import Float, Guide, Int, Model
+from ..surfaces import Surfaces
 from .chain_energy import ChainEnergy
 from .curve_table import CurveTable
 from .energy import corner_areas, corner_energy, corner_hessian
@@ -33,14 +37,16 @@ class GridEnergy:
     guide : Guide
         Fixes the topology and the origin z = 0.
     model : Model
+    surfaces : Surfaces
     table : CurveTable
         Of the model's curves.
     rest : RestLengths
         Its `vertices` (the local lengths) and `chains`; the rest lengths of the quads come with every call.
     """
 
-    def __init__(self, guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> None:
+    def __init__(self, guide: Guide, model: Model, surfaces: Surfaces, table: CurveTable, rest: RestLengths) -> None:
         self.guide = guide
+        self._surfaces = surfaces
         n = len(guide.points)
         used = np.zeros(n, dtype=bool)
         used[guide.quads] = True
@@ -56,31 +62,65 @@ class GridEnergy:
         row[self._inner] = np.arange(inner)
         row[self._slide] = np.arange(slide)
         self._chains = ChainEnergy(guide, model, rest.chains, self._table, row, slide, rest.turns)
-        # A vertex has one plane position, a node, in every face that it belongs to; a node of an interior vertex comes
-        # first, then those of sliding vertices, then the fixed ones.
-        key = guide.quad_face[:, None] * n + guide.quads
-        kind = np.where(guide.fixed, 2, np.where(guide.curve < 0, 0, 1))
-        keys, nodes = np.unique((kind[guide.quads] * len(model.faces) * n + key).T, return_inverse=True)
-        keys = keys % (len(model.faces) * n)
+        # Frames: one per face (unused where it is curved), then one per quad on a curved face.
+        bent = surfaces.curved[guide.quad_face]
+        self._bent = np.flatnonzero(bent)
+        frame = np.where(bent, len(model.faces) + np.cumsum(bent) - 1, guide.quad_face)
+        origins, frames = self._frames(model)
+        # Nodes: those of interior vertices of plane faces come first, then those of curved faces, of sliding vertices and of
+        # fixed ones.
+        total = len(frames) * n
+        kind = np.where(guide.fixed, 3, np.where(guide.curve < 0, 0, 2))[guide.quads]
+        kind = np.where((kind == 0) & bent[:, None], 1, kind)
+        keys, nodes = np.unique((kind * total + frame[:, None] * n + guide.quads).T, return_inverse=True)
+        first, middle, last = np.searchsorted(keys, total * np.arange(1, 4)).tolist()
+        keys = keys % total
         self._nodes = nodes.reshape(4, -1)
-        face, vertex = keys // n, keys % n
-        origin = np.array([f.origin for f in model.faces])[face]
-        axes = np.array([f.axes for f in model.faces])[face]
+        vertex = keys % n
+        origin, axes = origins[keys // n], frames[keys // n]
         self._plane = np.einsum("nc,nac->an", guide.points[vertex] - origin, axes)
-        moving = kind[vertex]
-        first, last = inner, inner + int((moving == 1).sum())
-        self._node_range = (first, last)
+        self._node_range = (first, middle, last)
         self._inner_row = row[vertex[:first]]
         self._inner_frame = (origin[:first], axes[:first])
-        self._slide_row = row[vertex[first:last]]
-        self._slide_axes = axes[first:last]
-        self._slide_shift = np.einsum("nc,nac->an", origin[first:last], self._slide_axes)
-        # Degree of freedom of both coordinates of every node; `size` stands for none.
+        self._slide_row = row[vertex[middle:last]]
+        self._slide_axes = axes[middle:last]
+        self._slide_shift = np.einsum("nc,nac->an", origin[middle:last], self._slide_axes)
+        # Degree of freedom of both coordinates of every node (on curved faces: both tangents); `size` stands for none.
         self._freedom = np.full((2, len(keys)), self.size)
-        self._freedom[:, :first] = 2 * self._inner_row + np.array([[0], [1]])
-        self._freedom[:, first:last] = 2 * inner + self._slide_row
+        self._freedom[:, :middle] = 2 * row[vertex[:middle]] + np.array([[0], [1]])
+        self._freedom[:, middle:last] = 2 * inner + self._slide_row
         self._inner_freedom = self._freedom[:, :first]
+        self._set_bent(row[vertex[first:middle]], axes[first:middle])
         self._set_pattern()
+
+    def _frames(self, model: Model) -> tuple[Float, Float]:
+        """Origins (f, 3) and axes (f, 2, 3) of the frames."""
+        origin = np.array([f.origin for f in model.faces])
+        axes = np.array([f.axes[:2] for f in model.faces])
+        if not len(self._bent):
+            return origin, axes
+        centre = self.guide.points[self.guide.quads[self._bent]].mean(axis=1)
+        normal = self._surfaces.normals(self.guide.quad_face[self._bent], centre)
+        return np.concatenate([origin, centre]), np.concatenate([axes, tangents_of(normal)])
+
+    def _set_bent(self, row: Int, axes: Float) -> None:
+        """Tangents at the interior vertices of curved faces, and the derivatives of their nodes (rows `row`, frames `axes`)."""
+        face = np.zeros(len(self.guide.points), np.int64)
+        face[self.guide.quads[self._bent]] = self.guide.quad_face[self._bent, None]
+        self._bent_rows = np.unique(row)
+        vertex = self._inner[self._bent_rows]
+        self._bent_face = face[vertex]
+        self._tangent = np.zeros((len(self._inner), 2, 3))
+        if len(vertex):
+            normals = self._surfaces.normals(self._bent_face, self.guide.points[vertex])
+            self._tangent[self._bent_rows] = tangents_of(normals)
+        first, middle, _ = self._node_range
+        self._bent_row = row
+        self._slope = np.einsum("nac,nbc->abn", axes, self._tangent[row]) * self._inner_length[2 * row]
+        slope = np.zeros((2, 2, self._plane.shape[1]))
+        slope[0, 0] = slope[1, 1] = 1.0
+        slope[:, :, first:middle] = self._slope
+        self._turned = slope[:, :, self._nodes[:, self._bent]].transpose(2, 0, 1, 3)
 
     def _set_pattern(self) -> None:
         """Column-compressed pattern of the Hessian and where its contributions go."""
@@ -106,10 +146,12 @@ class GridEnergy:
 
     def _corners(self, z: Float, world: Float) -> tuple[Float, Float]:
         """Corner coordinates x, y (4, q)."""
-        first, last = self._node_range
+        first, middle, last = self._node_range
         plane = self._plane.copy()
-        plane[:, :first] += (z[: 2 * first] * self._inner_length)[self._inner_freedom]
-        plane[:, first:last] = np.einsum("nc,nac->an", world[self._slide_row, :3], self._slide_axes) - self._slide_shift
+        plane[:, :first] += (z[: 2 * len(self._inner)] * self._inner_length)[self._inner_freedom]
+        if first < middle:
+            plane[:, first:middle] += (self._slope * z[self._freedom[:, first:middle]]).sum(axis=1)
+        plane[:, middle:last] = np.einsum("nc,nac->an", world[self._slide_row, :3], self._slide_axes) - self._slide_shift
         return plane[0].take(self._nodes), plane[1].take(self._nodes)
 
     def _tangents(self, derivative: Float) -> Float:
@@ -147,15 +189,20 @@ class GridEnergy:
         energy += corners
         if energy == np.inf:
             return energy, gradient
-        count, (first, last) = self._plane.shape[1], self._node_range
+        count, (first, middle, last) = self._plane.shape[1], self._node_range
         nodes = self._nodes.ravel()
         plane = np.stack([np.bincount(nodes, g.ravel(), minlength=count) for g in (gx, gy)])
         gradient[self._inner_freedom] = plane[:, :first]
-        gradient[: 2 * first] *= self._inner_length
+        inner = len(self._inner)
+        gradient[: 2 * inner] *= self._inner_length
+        if first < middle:
+            by_tangent = (self._slope * plane[:, None, first:middle]).sum(axis=0)
+            for k in (0, 1):
+                gradient[k : 2 * inner : 2] += np.bincount(self._bent_row, by_tangent[k], minlength=inner)
         if len(s):
-            along = (self._tangents(derivative) * plane[:, first:last]).sum(axis=0)
+            along = (self._tangents(derivative) * plane[:, middle:last]).sum(axis=0)
             by_s = np.bincount(self._slide_row, along, minlength=len(s)) + by_place + by_turning * derivative[:, 3]
-            gradient[2 * first :] = by_s * self._slide_length
+            gradient[2 * inner :] = by_s * self._slide_length
         return energy, gradient
 
     def factor(self, z: Float, sides: Float, eps: float, power: int) -> Callable[[Float], Float]:
@@ -165,13 +212,16 @@ class GridEnergy:
 
         s, world, derivative = self._places(z)
         blocks = corner_hessian(*self._corners(z, world), sides, eps, power)
-        first, last = self._node_range
+        first, middle, last = self._node_range
         scale = np.zeros_like(self._plane)
         scale[:, :first] = self._inner_length[self._inner_freedom]
-        scale[:, first:last] = self._tangents(derivative) * self._slide_length[self._slide_row]
+        scale[:, first:middle] = 1.0
+        scale[:, middle:last] = self._tangents(derivative) * self._slide_length[self._slide_row]
         corner = scale[:, self._nodes].swapaxes(0, 1)
         blocks *= corner[:, :, None, None]
         blocks *= corner
+        if len(self._bent):
+            blocks[..., self._bent] = _turned(blocks[..., self._bent], self._turned)
         edges, pairs = self._chains.hessian(s, world[:, 3], self._slide_length, derivative[:, 3])
         values = np.concatenate([blocks.ravel(), edges.ravel(), pairs.ravel()])
         data = np.asarray(np.bincount(self._target, values[self._kept], minlength=len(self._indices)), dtype=np.float64)
@@ -185,13 +235,37 @@ class GridEnergy:
         return solve
 
     def positions(self, z: Float) -> tuple[Float, Float]:
-        """Points (n, 3) and arc lengths (n,) of the guide's vertices; interior vertices lie in the plane of their face."""
+        """Points (n, 3) and arc lengths (n,) of the guide's vertices; interior vertices lie on their face."""
         points, arclength = self.guide.points.copy(), self.guide.arclength.copy()
-        first, _ = self._node_range
-        plane = self._plane[:, :first] + (z[: 2 * first] * self._inner_length)[self._inner_freedom]
+        first = self._node_range[0]
+        step = z[: 2 * len(self._inner)] * self._inner_length
+        plane = self._plane[:, :first] + step[self._inner_freedom]
         origin, axes = self._inner_frame
         points[self._inner[self._inner_row]] = origin + np.einsum("an,nac->nc", plane, axes)
+        if len(self._bent_rows):
+            rows = self._bent_rows
+            moved = points[self._inner[rows]] + np.einsum("na,nac->nc", step.reshape(-1, 2)[rows], self._tangent[rows])
+            points[self._inner[rows]] = self._surfaces.feet(self._bent_face, moved)
         s, world, _ = self._places(z)
         arclength[self._slide] = s
         points[self._slide] = world[:, :3]
         return points, arclength
+
+
+def tangents_of(normal: Float) -> Float:
+    """Orthonormal frames (n, 2, 3) perpendicular to unit normals (n, 3), which are the cross product of their axes."""
+    least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
+    one = np.cross(least, normal)
+    one /= np.linalg.norm(one, axis=1)[:, None]
+    return np.stack([one, np.cross(normal, one)], axis=1)
+
+
+def _turned(blocks: Float, slope: Float) -> Float:
+    """Blocks (4, 2, 4, 2, q) by the corners' coordinates as blocks by other variables.
+
+    `slope` (4, 2, 2, q) are the derivatives of the two coordinates of every corner by them.
+    """
+    half = blocks[:, :, :, 0, None] * slope[:, 0] + blocks[:, :, :, 1, None] * slope[:, 1]
+    first, second = slope[:, 0, :, None, None], slope[:, 1, :, None, None]
+    out: Float = half[:, 0, None] * first + half[:, 1, None] * second
+    return out

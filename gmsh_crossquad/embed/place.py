@@ -13,6 +13,7 @@ import numpy as np
 from ..layout.blocks import base_complex
 from ..layout.quotient import Quotient, arc_points, curve_chain
 from ..records import Bool, Float, Guide, Int, Model, TMesh
+from ..surfaces import Surfaces
 
 __all__ = ["coons", "place"]
 
@@ -49,12 +50,12 @@ def _length(line: Float) -> float:
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
-def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None = None) -> Guide:
+def place(model: Model, surfaces: Surfaces, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None = None) -> Guide:
     """The unsmoothed guide grid.
 
     Parameters
     ----------
-    model, tmesh, q
+    model, surfaces, tmesh, q
         `q` is the quotient with the guide's divisions.
     fine : tuple of (k,) int64, optional
         For every curve the final edges of every guide edge; needed where the curve prescribes its nodes.
@@ -114,6 +115,12 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
     points[fixed & (cad_vertex >= 0)] = model.vertices[cad_vertex[cad_vertex >= 0]]
     points = _carry(tmesh, q, element, points, held)
 
+    quad_face = tmesh.patch_face[q.quad_patch]
+    bent = np.full(n, -1, np.int64)  # the curved face of the vertices inside it
+    bent[q.quads] = np.where(surfaces.curved[quad_face], quad_face, -1)[:, None]
+    bent[(curve >= 0) | (cad_vertex >= 0)] = -1
+    points = _put_back(points, bent, surfaces)
+
     quad_size = np.empty((len(q.quads), 2))
     row = 0
     for p, grid in q.grids:
@@ -123,8 +130,8 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
         side = [sum(float(tmesh.length[arc]) for arc, _ in s) for s in tmesh.patches[p]]
         quad_size[row : row + a * b] = 0.5 * (side[0] + side[2]) / a, 0.5 * (side[1] + side[3]) / b
         row += a * b
-    quad_face = tmesh.patch_face[q.quad_patch]
-    curve_edges = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in chains])
+    points = _put_back(points, bent, surfaces)
+    curve_edges = np.concatenate([np.zeros((0, 2), np.int64), *(np.stack([c[:-1], c[1:]], axis=1) for c in chains)])
     block, _ = base_complex(q.quads, quad_face, curve_edges, n, fixed)
     return Guide(
         points=points,
@@ -138,6 +145,16 @@ def place(model: Model, tmesh: TMesh, q: Quotient, fine: tuple[Int, ...] | None 
         quad_size=quad_size,
         chains=chains,
     )
+
+
+def _put_back(points: Float, face: Int, surfaces: Surfaces) -> Float:
+    """Points with those of rows with a face (not -1) at their nearest place on it."""
+    rows = np.flatnonzero(face >= 0)
+    if not len(rows):
+        return points
+    out = points.copy()
+    out[rows] = surfaces.feet(face[rows], points[rows])
+    return out
 
 
 def _carry(tmesh: TMesh, q: Quotient, element: Float, points: Float, held: Bool) -> Float:

@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..records import Float, Guide, Int, Model
+from ..records import Float, Guide, Int
+from ..surfaces import Surfaces, quad_normals
 
 __all__ = ["guide_quality", "scaled_jacobian"]
 
@@ -66,7 +67,6 @@ def _least_corner(columns: Float, quads: Int, normals: Float) -> Float:
     return least
 
 
-def guide_quality(guide: Guide, model: Model) -> Float:
-    """Least scaled Jacobian (q,) of every quad of a guide grid, against its face's normal."""
-    normals = np.array([np.cross(*face.axes) for face in model.faces])
-    return scaled_jacobian(guide.points, guide.quads, normals[guide.quad_face])
+def guide_quality(guide: Guide, surfaces: Surfaces) -> Float:
+    """Least scaled Jacobian (q,) of every quad of a guide grid, against its face's normal or, on a curved face, its own."""
+    return scaled_jacobian(guide.points, guide.quads, quad_normals(surfaces, guide.points, guide.quads, guide.quad_face))

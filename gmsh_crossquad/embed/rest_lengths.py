@@ -24,6 +24,7 @@ import numpy as np
 from ..errors import MeshError
 from ..quad_edges import edges_of_quads
 from ..records import Bool, Float, Guide, Int, Model
+from ..surfaces import Surfaces, quad_normals
 from .curve_table import CurveTable
 from .start import chain_arclengths
 
@@ -69,13 +70,16 @@ class RestLengths:
     vertices: Float
 
 
-def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: float = 0.0, graded: bool = True) -> RestLengths:
+def rest_lengths(
+    guide: Guide, model: Model, surfaces: Surfaces, table: CurveTable, *, actual: float = 0.0, graded: bool = True
+) -> RestLengths:
     """Make the sizes of a guide grid consistent.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    surfaces : Surfaces
     table : CurveTable
         Of the model's curves.
     actual : float
@@ -142,7 +146,7 @@ def rest_lengths(guide: Guide, model: Model, table: CurveTable, *, actual: float
     target = 0.25 * (per_quad[0] + per_quad[2]) * (per_quad[1] + per_quad[3])
     faces = len(model.faces)
     wanted = np.bincount(guide.quad_face, target, minlength=faces)
-    area = np.abs(np.bincount(guide.quad_face, _signed_areas(guide, model), minlength=faces))
+    area = np.abs(np.bincount(guide.quad_face, _signed_areas(guide, surfaces), minlength=faces))
     scale = np.sqrt(np.divide(area, wanted, out=np.ones(faces), where=(wanted > 0.0) & (area > 0.0)))[guide.quad_face]
     ends = edges.ravel()
     at_vertex = np.bincount(ends, np.repeat(np.log(length), 2), minlength=len(guide.points))
@@ -236,9 +240,9 @@ def _fill_chain(length: Float, guide: Guide, model: Model, row: int) -> Float:
     return length * np.repeat(span / np.add.reduceat(length, at[:-1]), np.diff(at))
 
 
-def _signed_areas(guide: Guide, model: Model) -> Float:
+def _signed_areas(guide: Guide, surfaces: Surfaces) -> Float:
     corners = guide.points[guide.quads]
-    normals = np.array([np.cross(*face.axes) for face in model.faces])[guide.quad_face]
+    normals = quad_normals(surfaces, guide.points, guide.quads, guide.quad_face)
     diagonals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     area: Float = 0.5 * np.einsum("qc,qc->q", diagonals, normals)
     return area

@@ -26,10 +26,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from ..records import Float, Guide, Int, Model
+from ..surfaces import Surfaces
 from .curve_table import CurveTable
 from .grid_energy import GridEnergy
 from .minimise import minimise
@@ -43,8 +45,14 @@ ROUNDS = 12
 """Greatest number of untangling rounds per start."""
 POLISHING = ((4, 4), (4, 8))
 """Power and factorisations of the polishing rounds; every round makes new rest lengths from the grid before it."""
-SHARPENING = (12, 6)
+SHARPENING = ((12, 6),)
 """The same for the worst corners, which a high power puts first; only where the result is below `WANTED`."""
+EFFORT = 4
+"""Factorisations of an untangling round."""
+POLISHING_CURVED = ((4, 2),) * 6
+SHARPENING_CURVED = ((12, 2),) * 3
+EFFORT_CURVED = 3
+"""The same where there are curved faces: after every round the vertices are put back, so there are more and shorter ones."""
 WANTED = 0.85
 POOR = 0.15
 WORTH = 4.0
@@ -89,7 +97,28 @@ class SmoothReport:
     starts: int
 
 
-def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
+class _Ground(NamedTuple):
+    """What the guide lies on."""
+
+    model: Model
+    surfaces: Surfaces
+    table: CurveTable
+
+    @property
+    def bent(self) -> bool:
+        return bool(self.surfaces.curved.any())
+
+    def quality(self, guide: Guide) -> Float:
+        return guide_quality(guide, self.surfaces)
+
+    def rest(self, guide: Guide, actual: float = 0.0, graded: bool = True) -> RestLengths:
+        return rest_lengths(guide, self.model, self.surfaces, self.table, actual=actual, graded=graded)
+
+    def energy(self, guide: Guide, rest: RestLengths) -> GridEnergy:
+        return GridEnergy(guide, self.model, self.surfaces, self.table, rest)
+
+
+def smooth(guide: Guide, model: Model, surfaces: Surfaces) -> tuple[Guide, SmoothReport]:
     """Untangle and polish a guide grid.
 
     Parameters
@@ -97,6 +126,7 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     guide : Guide
         May have inverted quads, edges without length, ties and wrong orders on the curves.
     model : Model
+    surfaces : Surfaces
 
     Returns
     -------
@@ -109,41 +139,43 @@ def smooth(guide: Guide, model: Model) -> tuple[Guide, SmoothReport]:
     MeshError
         Where prescribed nodes are not in order along a curve.
     """
-    table = CurveTable(model.curves)
-    given = spread_chains(guide, model, table)
-    rest = rest_lengths(given, model, table)
-    placed = rest_lengths(given, model, table, actual=1.0, graded=False)
-    tangled = float(np.mean(guide_quality(given, model) <= 0.0))
+    ground = _Ground(model, surfaces, CurveTable(model.curves))
+    given = spread_chains(guide, model, ground.table)
+    rest = ground.rest(given)
+    placed = ground.rest(given, actual=1.0, graded=False)
+    tangled = float(np.mean(ground.quality(given) <= 0.0))
     order = ("placed", "even", "laplace") if tangled <= TRUSTED else ("even", "placed", "laplace")
     best, quality, chosen, rounds = given, -np.inf, order[0], 0
     starts = 0
     for name in order:
         starts += 1
-        start = laplace_start(given, model, table) if name == "laplace" else given
+        start = laplace_start(given, *ground) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
-        candidate, used, valid = _untangle(start, model, table, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
+        candidate, used, valid = _untangle(start, ground, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
         rounds += used
-        candidate, score = _polish_all(candidate, model, table, rest)
+        candidate, score = _polish_all(candidate, ground, rest)
         if score > quality or (valid and quality <= 0.0):
             best, quality, chosen = candidate, score, name
         if quality > (DOUBTFUL if name == order[0] else 0.0):
             break
-    final = guide_quality(best, model)
+    final = ground.quality(best)
     return best, SmoothReport(float(final.min()), np.flatnonzero(final <= 0.0), rounds, chosen, starts)
 
 
-def _polish_all(guide: Guide, model: Model, table: CurveTable, rest: RestLengths) -> tuple[Guide, float]:
+def _polish_all(guide: Guide, ground: _Ground, rest: RestLengths) -> tuple[Guide, float]:
     """The most polished grid that is as good as those before it, and its least scaled Jacobian."""
     best, latest = guide, guide
-    quality = now = float(guide_quality(guide, model).min())
-    for power, effort in POLISHING:
-        latest = _polish(latest, model, table, rest, power, effort, barrier=now > VALID)
-        now = float(guide_quality(latest, model).min())
+    quality = now = float(ground.quality(guide).min())
+    for power, effort in POLISHING_CURVED if ground.bent else POLISHING:
+        latest = _polish(latest, ground, rest, power, effort, barrier=now > VALID)
+        now = float(ground.quality(latest).min())
         if min(now, GOOD) >= KEPT * min(quality, GOOD):
             best, quality = latest, now
     if VALID < quality < WANTED:
-        sharp = _polish(best, model, table, rest, *SHARPENING, barrier=True)
-        before, after = guide_quality(best, model), guide_quality(sharp, model)
+        sharp = best
+        for power, effort in SHARPENING_CURVED if ground.bent else SHARPENING:
+            sharp = _polish(sharp, ground, rest, power, effort, barrier=True)
+        before, after = ground.quality(best), ground.quality(sharp)
         score = float(after.min())
         if score > quality and (quality < POOR or score - quality > WORTH * (before.mean() - after.mean())):
             best, quality = sharp, score
@@ -155,24 +187,26 @@ def _moved(guide: Guide, grid: GridEnergy, z: Float) -> Guide:
     return replace(guide, points=points, arclength=arclength)
 
 
-def _untangle(
-    guide: Guide, model: Model, table: CurveTable, rest: RestLengths, sides: Float, most: int
-) -> tuple[Guide, int, bool]:
+def _untangle(guide: Guide, ground: _Ground, rest: RestLengths, sides: Float, most: int) -> tuple[Guide, int, bool]:
     """Minimise the regularised energy until no corner is turned over: the result, the rounds, and whether it is valid."""
-    grid = GridEnergy(guide, model, table, rest)
+    grid = ground.energy(guide, rest)
     z = np.zeros(grid.size)
     least = float(grid.areas(z, sides).min())
     rounds, eps = 0, np.inf
-    while least <= LEAST_AREA and rounds < most and grid.size:
+    bent = ground.bent
+    while least <= LEAST_AREA and rounds < (2 * most if bent else most) and grid.size:
         eps = max(LEAST_EPS, min(0.5 * eps, float(np.sqrt(1e-6 + 0.04 * least * least))))
         z = minimise(
             partial(grid.value, sides=sides, eps=eps, power=1),
             partial(grid.factor, sides=sides, eps=eps, power=1),
             z,
-            factorisations=4,
+            factorisations=EFFORT_CURVED if bent else EFFORT,
             tolerance=1e-3,
-            done=lambda y: float(grid.areas(y, sides).min()) > 0.05,
+            done=partial(_done, grid, sides),
         ).z
+        if bent:  # the frames have changed
+            guide = _moved(guide, grid, z)
+            grid, z = ground.energy(guide, rest), np.zeros(grid.size)
         rounds += 1
         before, least = least, float(grid.areas(z, sides).min())
         if rounds > 6 and least <= 0.0 and abs(least - before) < 1e-6 * abs(before):
@@ -180,18 +214,25 @@ def _untangle(
     return _moved(guide, grid, z), rounds, least > 0.0
 
 
-def _polish(guide: Guide, model: Model, table: CurveTable, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
+def _done(grid: GridEnergy, sides: Float, z: Float) -> bool:
+    return float(grid.areas(z, sides).min()) > 0.05
+
+
+def _polish(guide: Guide, ground: _Ground, rest: RestLengths, power: int, effort: int, barrier: bool) -> Guide:
     """Minimise the energy with graded rest lengths, inside the barrier; from a tangled grid with eps > 0 and power 1."""
     if barrier:
-        rest = rest_lengths(guide, model, table, actual=0.5)
-    grid = GridEnergy(guide, model, table, rest)
+        rest = ground.rest(guide, actual=0.5)
+    grid = ground.energy(guide, rest)
     if not grid.size:
         return guide
+    z = np.zeros(grid.size)
+    if ground.bent and barrier:  # the frames of the energy are not those of the quality
+        barrier = float(grid.areas(z, rest.sides).min()) > 0.0
     eps, power = (0.0, power) if barrier else (1e-3, 1)
     result = minimise(
         partial(grid.value, sides=rest.sides, eps=eps, power=power),
         partial(grid.factor, sides=rest.sides, eps=eps, power=power),
-        np.zeros(grid.size),
+        z,
         factorisations=effort,
     )
     return _moved(guide, grid, result.z)

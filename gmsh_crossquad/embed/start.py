@@ -8,7 +8,12 @@ chain in good order stays as it is, ties are opened and wrong orders undone.
 
     sum over the neighbours w of v of (x_w - x_v) = 0,
 
-the uniform Laplace equation of the edge graph (a Tutte embedding of every face).
+the uniform Laplace equation of the edge graph (a Tutte embedding of every face).  A curved face would be cut off by that; here
+the vertices make `STEPS` implicit steps of the flow towards the harmonic map into the surface,
+
+    (deg v + ANCHOR) x_v - sum x_w = ANCHOR y_v,    y <- nearest point of the surface to x,
+
+from where they are.
 
 References
 ----------
@@ -25,10 +30,14 @@ import numpy as np
 from ..errors import MeshError
 from ..quad_edges import edges_of_quads
 from ..records import Float, Guide, Model
+from ..surfaces import Surfaces
 from .curve_table import CurveTable
 
 __all__ = ["chain_arclengths", "laplace_start", "spread_chains"]
 
+ANCHOR = 0.1
+"""Weight of a vertex's own place, over that of one neighbour; one step reaches about three edges far."""
+STEPS = 20
 LEAST_GAP = 0.05
 """Least gap between neighbours on a curve at the start, over the even gap."""
 
@@ -95,13 +104,14 @@ def spread_chains(guide: Guide, model: Model, table: CurveTable, even: bool = Fa
     return replace(guide, points=points, arclength=arclength)
 
 
-def laplace_start(guide: Guide, model: Model, table: CurveTable) -> Guide:
+def laplace_start(guide: Guide, model: Model, surfaces: Surfaces, table: CurveTable) -> Guide:
     """Even gaps on the curves, uniform Laplace in the interior.
 
     Parameters
     ----------
     guide : Guide
     model : Model
+    surfaces : Surfaces
     table : CurveTable
         Of the model's curves.
 
@@ -125,17 +135,28 @@ def laplace_start(guide: Guide, model: Model, table: CurveTable) -> Guide:
     number = np.cumsum(free) - 1
     degree = np.bincount(rows, minlength=n)[free].astype(float)
     k = len(degree)
+    face = np.zeros(n, dtype=np.int64)
+    face[guide.quads] = guide.quad_face[:, None]
+    face = face[free]
+    bent = surfaces.curved[face]
+    anchor = np.where(bent, ANCHOR, 0.0)
     inner = free[rows] & free[cols]
     outer = free[rows] & ~free[cols]
     diagonal = np.arange(k)
     matrix = csc_array(
         (
-            np.concatenate([degree, np.full(int(inner.sum()), -1.0)]),
+            np.concatenate([degree + anchor, np.full(int(inner.sum()), -1.0)]),
             (np.concatenate([diagonal, number[rows[inner]]]), np.concatenate([diagonal, number[cols[inner]]])),
         ),
         shape=(k, k),
     )
     load = np.column_stack([np.bincount(number[rows[outer]], guide.points[cols[outer], c], minlength=k) for c in range(3)])
     points = guide.points.copy()
-    points[free] = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(load)
+    lu = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    place = points[free]
+    for _ in range(STEPS if bent.any() else 1):
+        place = lu.solve(load + anchor[:, None] * place)
+        if bent.any():
+            place[bent] = surfaces.feet(face[bent], place[bent])
+    points[free] = place
     return replace(guide, points=points)
