@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gmsh_crossquad.errors import LayoutError
+from gmsh_crossquad.errors import GeometryError, LayoutError
 from gmsh_crossquad.field.align import Aligner
 from gmsh_crossquad.field.cancel import _Energies
 from gmsh_crossquad.field.clearance import Clearance
@@ -411,3 +411,38 @@ def test_indices_that_contradict_a_surface_are_refused():
     rotation = aligned_field(face_mesh(mesh)).field.rotation
     with pytest.raises(LayoutError, match="do not fit"):
         Aligner(mesh, FieldOperators(mesh), wanted).close(rotation)
+
+
+def test_a_strip_with_one_side_is_refused():
+    # a Moebius strip of triangles between its two sides
+    n, w = 24, 4
+    i, j = np.meshgrid(np.arange(n), np.arange(w), indexing="ij")
+
+    def at(a, b):
+        return np.where(a == n, w - b, a % n * (w + 1) + b)
+
+    a, b, c, d = (at(i + p, j + q).ravel() for p, q in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    u = np.repeat(np.arange(n), w + 1) * 2 * np.pi / n
+    v = np.tile(np.linspace(-0.4, 0.4, w + 1), n)
+    r = 1 + v * np.cos(u / 2)
+    points = np.stack([r * np.cos(u), r * np.sin(u), v * np.sin(u / 2)], axis=1)
+    strip = SurfaceMesh(points, np.concatenate([np.stack(t, axis=1) for t in ((a, b, c), (a, c, d))]))
+    face = replace(FACES["cylinder"][0], points=points, triangles=strip.triangles)
+    with pytest.raises(GeometryError, match="one side only"):
+        aligned_field(face)
+
+
+@pytest.mark.parametrize(
+    "triangles, match", [([[0, 1, 2], [1, 0, 3], [0, 1, 4]], "more than two"), ([[0, 1, 2], [0, 3, 4]], "touches itself")]
+)
+def test_what_is_no_surface_is_refused(triangles, match):
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]])
+    face = replace(FACES["cylinder"][0], points=points, triangles=np.array(triangles))
+    with pytest.raises(GeometryError, match=match):
+        aligned_field(face)
+
+
+@pytest.mark.parametrize("mesh, expected", [(sphere(6), 8), (hemisphere(8), 4), (torus(cells=(20, 10)), 0)])
+def test_a_core_size_on_curved_surfaces(mesh, expected):
+    index = aligned_field(face_mesh(mesh), epsilon=0.15).index
+    assert index[index != 0].tolist() == [1] * expected

@@ -15,6 +15,7 @@ from .compatibility import Incompatible, add_singularities, change_boundary, mis
 from .corners import boundary_indices
 from .flux import vanish_flux
 from .operators import FieldOperators
+from .orientation import check_oriented
 from .relax import leave_corners, relax_singularities
 from .singularities import singular_vertices, snap_to_vertices
 from .smooth import smooth_field
@@ -68,9 +69,12 @@ def aligned_field(
     ------
     Incompatible
         If the indices do not add up.
+    GeometryError
+        If the triangles are no oriented surface.
     LayoutError
     """
     surface = SurfaceMesh(mesh.points, mesh.triangles)
+    check_oriented(surface)
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index
     if field is not None:

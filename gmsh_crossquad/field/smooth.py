@@ -12,9 +12,9 @@ the global frame: one real matrix with the real and imaginary part as two right-
 the frame of its edge, and K is the connection Laplacian (`connection`).
 
 It starts from the harmonic z.  In a component without boundary that is 0: there it starts from a mode of least energy, found by
-inverse iteration of ``K + M / area`` from the three axes' projections on the tangent planes, ``sum over axes of (x_a + i y_a)^4``
-for an edge along x and y to the left of it.  On a sphere that is a mode, one of nine, and its zeros are the eight corners of a cube.
-A little noise keeps the iteration from a mode of higher energy where the axes are orthogonal to the lowest.
+inverse iteration of ``K + M / area`` from the projections of the three axes, ``sum over axes a of (x_a + i y_a)^4`` for an edge
+along x and y to the left of it.  On a sphere that is a mode, one of nine, and its zeros are the eight corners of a cube.  A bit
+of noise keeps the iteration from a mode of higher energy where the axes are orthogonal to the lowest.
 
 Diffusion has no core size.  With a given epsilon it is the start for a minimisation of the energy itself (`ginzburg_landau`).
 """
