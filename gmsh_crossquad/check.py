@@ -1,9 +1,10 @@
 """Judging a surface mesh from a file, by itself and against the model that it is a mesh of.
 
-By itself: cells, scaled Jacobians against the mean normal of each surface (a cell folded over shows as negative), irregular
-vertices (valence not 4, off the free boundary and off all line elements), and conformity: an edge with a single cell must not
-have nodes of other single-cell edges in its inside (a hanging node), nor lie on another such edge (a crack), unless both are
-on curves of the model that bound one surface: that crack was drawn.
+By itself: cells, scaled Jacobians against the mean normal of each flat surface (a cell folded over shows as negative) and against
+the cell's own on others (there one that lies against its neighbours counts as negative), irregular vertices (valence not 4, off
+the free boundary and off all line elements), and conformity: an edge with a single cell must not have nodes of other single-cell
+edges in its inside (a hanging node), nor lie on another such edge (a crack), unless both are on curves of the model that bound
+one surface: that crack was drawn.
 
 `compare` goes on with the model; `judge` is the command.
 """
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .embed.quality import scaled_jacobian
-from .quality import twins
+from .quality import turned_over, twins
 from .records import Float, Int
 
 if TYPE_CHECKING:
@@ -60,8 +61,9 @@ class Report:
     faults: tuple[str, ...] = field(default=())
 
 
-def _jacobians(points: Float, cells: Int, entity: Int) -> Float:
-    """Scaled Jacobian of every cell against the mean normal of its surface where that is flat, else against its own."""
+def _jacobians(points: Float, cells: Int, entity: Int, lines: Int) -> Float:
+    """Scaled Jacobian of every cell against the mean normal of its surface where that is flat, else against its own, negative
+    where it lies against its neighbours; these may meet in creases along `lines` (l, 2)."""
     area = 0.5 * np.cross(points[cells[:, 2]] - points[cells[:, 0]], points[cells[:, -1]] - points[cells[:, 1]])
     if cells.shape[1] == 3:
         area = 0.5 * np.cross(points[cells[:, 1]] - points[cells[:, 0]], points[cells[:, 2]] - points[cells[:, 0]])
@@ -75,12 +77,25 @@ def _jacobians(points: Float, cells: Int, entity: Int) -> Float:
     curved = turned[row] | (length == 0.0)
     normal[curved] = _unit(area[curved])
     if cells.shape[1] == 4:
-        return scaled_jacobian(points, cells, normal)
+        value = scaled_jacobian(points, cells, normal)
+        bent = np.flatnonzero(curved)
+        if len(bent):
+            half = _keys(cells[bent].ravel(), np.roll(cells[bent], -1, axis=1).ravel(), len(points))
+            on_line = np.isin(half, _keys(lines[:, 0], lines[:, 1], len(points)))
+            against = bent[turned_over(points, cells[bent], entity[bent], on_line)]
+            value[against] = -np.abs(value[against])
+        return value
     side = np.roll(points[cells], -1, axis=1) - points[cells]
     scale = np.linalg.norm(side, axis=2)
     product = (scale * np.roll(scale, 1, axis=1)).max(axis=1)
     value = 2.0 * np.einsum("tc,tc->t", area, normal) * (2.0 / np.sqrt(3.0))
     return np.divide(value, product, out=np.zeros(len(cells)), where=product > 0.0)
+
+
+def _keys(start: Int, end: Int, n: int) -> Int:
+    """One number for each edge, in whatever direction it runs."""
+    out: Int = np.minimum(start, end) * n + np.maximum(start, end)
+    return out
 
 
 def _unit(vectors: Float) -> Float:
@@ -165,7 +180,7 @@ def check_mesh(mesh: MeshArrays) -> Report:
     """
     quality = np.concatenate(
         [
-            _jacobians(mesh.points, cells, entity)
+            _jacobians(mesh.points, cells, entity, mesh.lines)
             for cells, entity in ((mesh.quads, mesh.quad_entity), (mesh.triangles, mesh.triangle_entity))
             if len(cells)
         ]

@@ -1,7 +1,7 @@
 """Judging a surface mesh against the model that it is a mesh of.
 
 Every CAD vertex is a node, every edge with a single cell follows a curve at which the model's faces end and these curves are
-followed by such edges, the area is the model's, and every physical group is carried in full.
+followed by such edges, the nodes lie on the faces, the area is the model's, and every physical group is carried in full.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from .check import TOUCH, Report, free_edges
 from .records import Curve, Float, Int, Model
+from .surfaces import Surfaces
 
 if TYPE_CHECKING:
     from .cad.files import MeshArrays
@@ -24,9 +25,18 @@ _MEASURE = 0.02
 
 _SAMPLES = 200  # of a curve
 _ON_CURVE = 1e-5  # of the model: the samples of a curve may be that far from it
+_ON_FACE = 1e-5  # of the model
+_LOOKED_UP = 2_000  # nodes of surfaces that are none of the model's for which its faces are searched
 
 
-def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[int, str], tuple[int, ...]]) -> Report:
+def compare(
+    report: Report,
+    mesh: MeshArrays,
+    model: Model,
+    surfaces: Surfaces,
+    groups: dict[tuple[int, str], tuple[int, ...]],
+    curved_areas: Float,
+) -> Report:
     """Add what is wrong with respect to the model.
 
     Parameters
@@ -34,8 +44,12 @@ def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[i
     report : Report
     mesh : MeshArrays
     model : Model
+    surfaces : Surfaces
+        Its faces.
     groups : dict of (dim, name) -> entity tags
         The model's physical groups.
+    curved_areas : (f,) float64, scaled
+        Areas of the curved faces; those of plane ones are inside their loops.
 
     Returns
     -------
@@ -59,7 +73,10 @@ def compare(report: Report, mesh: MeshArrays, model: Model, groups: dict[tuple[i
     left = _left_curves(points, free_edges(mesh), model)
     if left:
         faults.append("the boundary does not follow curve " + ", ".join(map(str, left)))
-    areas = np.array([_face_area(model, row) for row in range(len(model.faces))])
+    off = _off_faces(points, mesh, model, surfaces)
+    if off:
+        faults.append(f"{off} nodes are not on the faces of the model")
+    areas = np.array([a if f.curved else _face_area(model, row) for row, (f, a) in enumerate(zip(model.faces, curved_areas))])
     area = _cell_areas(points, mesh)
     if abs(area.sum() - areas.sum()) > _MEASURE * areas.sum() + _cut_off(points, mesh):
         faults.append(f"the area is {area.sum() * model.scale**2:.6g} and not {areas.sum() * model.scale**2:.6g}")
@@ -93,6 +110,29 @@ def _face_area(model: Model, row: int) -> float:
             p = face.local(model.curves[curve].points)[::sign]
             total += 0.5 * float(np.sum(p[:-1, 0] * p[1:, 1] - p[1:, 0] * p[:-1, 1]))
     return total
+
+
+def _off_faces(points: Float, mesh: MeshArrays, model: Model, surfaces: Surfaces) -> int:
+    """Nodes of quads that are on no curved or plane face of a model with curved ones: first on the face with the tag of their
+    surface, then on any."""
+    if not surfaces.curved.any() or not len(mesh.quads):
+        return 0
+    row = {face.tag: f for f, face in enumerate(model.faces)}
+    face = np.repeat([row.get(t, -1) for t in mesh.quad_entity.tolist()], 4)
+    node, first = np.unique(mesh.quads.ravel(), return_index=True)
+    face = face[first]
+    known = np.flatnonzero(face >= 0)
+    far = np.ones(len(node), bool)
+    feet = surfaces.feet(face[known], points[node[known]])
+    far[known] = np.linalg.norm(feet - points[node[known]], axis=1) > _ON_FACE
+    left = node[far]
+    wanted = left[:: max(1, -(-len(left) // _LOOKED_UP))]
+    for f in range(len(model.faces)):
+        if not len(wanted):
+            break
+        away = np.linalg.norm(surfaces.feet(np.full(len(wanted), f), points[wanted]) - points[wanted], axis=1)
+        wanted = wanted[away > _ON_FACE]
+    return len(wanted)
 
 
 def _ends_of_faces(model: Model) -> list[Curve]:

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .check import check_mesh, format_report
+import numpy as np
+
+from .check import Report, check_mesh, format_report
 from .compare import compare
+from .surfaces import Planes
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from .cad.files import MeshArrays
 
 __all__ = ["check_task"]
 
 
 def check_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:
     """The work of ``gmsh-crossquad check``, in the child process: the table as text, and the faults."""
-    from .cad.files import open_model, physical_groups, read_mesh
+    from .cad.files import open_model, read_mesh
     from .cad.session import guest
 
     with guest():
@@ -24,10 +29,25 @@ def check_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, An
         mesh = read_mesh()
         report = check_mesh(mesh)
         if job["model"]:
-            from .cad.read import read_model
-            from .options import MeshOptions
-
             emit("open the model")
             open_model(job["model"])
-            report = compare(report, mesh, read_model(MeshOptions()), physical_groups())
+            report = _compared(report, mesh)
     return {"table": format_report(report, job["mesh"]), "faults": list(report.faults)}
+
+
+def _compared(report: Report, mesh: MeshArrays) -> Report:
+    """The report with what is wrong with respect to the current Gmsh model."""
+    from .cad.areas import curved_areas
+    from .cad.background import background_meshes
+    from .cad.files import physical_groups
+    from .cad.read import read_model
+    from .cad.surfaces import CadSurfaces
+    from .options import MeshOptions
+
+    options = MeshOptions()
+    model = read_model(options)
+    if not any(face.curved for face in model.faces):
+        return compare(report, mesh, model, Planes(model), physical_groups(), np.full(len(model.faces), np.nan))
+    meshes = background_meshes(model, options)
+    surfaces = CadSurfaces(model, meshes)
+    return compare(report, mesh, model, surfaces, physical_groups(), curved_areas(model, surfaces, meshes))

@@ -1,6 +1,8 @@
 """The numbers of a quad mesh: scaled Jacobians, irregular vertices, conformity.
 
-All of them come from the connectivity (integers) and from `scaled_jacobian`; nothing is measured with a tolerance.
+All of them come from the connectivity (integers) and from `scaled_jacobian`; nothing is measured with a tolerance.  A quad of a
+plane face is judged against the face's normal, one of a curved face against its own: there a quad is turned over where it lies
+against its neighbours (`turned_over`).
 """
 
 from __future__ import annotations
@@ -12,7 +14,18 @@ import numpy as np
 from .embed.quality import scaled_jacobian
 from .records import Bool, Float, Int, QuadMesh
 
-__all__ = ["Quality", "curve_edges", "inner_nodes", "is_conforming", "measure_quality", "twins"]
+__all__ = [
+    "Quality",
+    "curve_edges",
+    "inner_nodes",
+    "is_conforming",
+    "measure_quality",
+    "quad_quality",
+    "turned_over",
+    "twins",
+]
+
+_AGAINST = np.cos(np.radians(100.0))  # neighbours whose normals turn by more lie against each other
 
 
 @dataclass(frozen=True)
@@ -120,6 +133,64 @@ def inner_nodes(mesh: QuadMesh) -> Bool:
     return out
 
 
+def turned_over(points: Float, quads: Int, face: Int, lines: Bool) -> Bool:
+    """Quads of curved faces that lie against their neighbours: the normal turns by more than 100 degrees across an edge.
+
+    Of the two quads at such an edge it is the one with more of these edges, or both.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    quads : (q, 4) int64
+    face : (q,) int64
+    lines : (4 q,) bool
+        Half-edges ``4 q + i`` on curves, where a surface may have a crease.
+
+    Returns
+    -------
+    (q,) bool
+    """
+    corner = points[quads]
+    area = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    length = np.linalg.norm(area, axis=1)
+    twin = twins(quads)
+    half = np.flatnonzero((twin > np.arange(len(twin))) & ~lines)
+    a, b = half // 4, twin[half] // 4
+    same = (face[a] == face[b]) & (quads.ravel()[half] != quads.ravel()[twin[half]])  # oriented alike
+    a, b = a[same], b[same]
+    against = np.einsum("ec,ec->e", area[a], area[b]) < _AGAINST * length[a] * length[b]
+    a, b = a[against], b[against]
+    count = np.bincount(np.concatenate([a, b]), minlength=len(quads))
+    out = np.zeros(len(quads), bool)
+    out[a[count[a] >= count[b]]] = True
+    out[b[count[b] >= count[a]]] = True
+    return out
+
+
+def quad_quality(mesh: QuadMesh, normals: Float) -> Float:
+    """Scaled Jacobian (q,) of every quad; negative where it is turned over.
+
+    Parameters
+    ----------
+    mesh : QuadMesh
+    normals : (f, 3) float64
+        As for `measure_quality`.
+    """
+    direction = normals[mesh.quad_face]
+    curved = np.flatnonzero(np.isnan(direction[:, 0]))
+    if not len(curved):
+        return scaled_jacobian(mesh.points, mesh.quads, direction)
+    corner = mesh.points[mesh.quads[curved]]
+    area = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    direction[curved] = np.divide(area, length, out=np.zeros_like(area), where=length > 0.0)
+    value = scaled_jacobian(mesh.points, mesh.quads, direction)
+    lines = (curve_edges(mesh) >= 0).reshape(-1, 4)[curved].ravel()
+    against = curved[turned_over(mesh.points, mesh.quads[curved], mesh.quad_face[curved], lines)]
+    value[against] = -np.abs(value[against])
+    return value
+
+
 def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     """Measure a quad mesh.
 
@@ -127,13 +198,13 @@ def measure_quality(mesh: QuadMesh, normals: Float) -> Quality:
     ----------
     mesh : QuadMesh
     normals : (f, 3) float64
-        Unit normal of every face.
+        Unit normal of every plane face, NaN for curved ones.
 
     Returns
     -------
     Quality
     """
-    value = scaled_jacobian(mesh.points, mesh.quads, normals[mesh.quad_face])
+    value = quad_quality(mesh, normals)
     inner = inner_nodes(mesh)
     valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
     return Quality(

@@ -13,7 +13,7 @@ import numpy as np
 
 from .block_layout import Block, Edge, Layout, build_layout
 from .face_field import FaceField, Singularity, face_field, singularities_of
-from .quality import Quality, measure_quality
+from .quality import Quality, measure_quality, quad_quality
 from .records import AlignedField, FaceMesh, Float, Model, QuadMesh
 
 __all__ = ["Block", "Edge", "FaceField", "Layout", "MeshResult", "Singularity", "Stages"]
@@ -62,8 +62,13 @@ class MeshResult:
 
     @cached_property
     def normals(self) -> Float:
-        """(f, 3) unit normal of every face, by row of the model's faces."""
-        return np.array([np.cross(face.axes[0], face.axes[1]) for face in self.stages.model.faces])
+        """(f, 3) unit normal of every plane face, by row of the model's faces; NaN for curved ones."""
+        return np.array([np.full(3, np.nan) if face.curved else face.normal for face in self.stages.model.faces])
+
+    @cached_property
+    def quad_quality(self) -> Float:
+        """(q,) scaled Jacobian of every quad."""
+        return quad_quality(self.mesh, self.normals)
 
     @cached_property
     def quality(self) -> Quality:

@@ -6,8 +6,11 @@ import pytest
 from gmsh_crossquad.cad.files import MeshArrays
 from gmsh_crossquad.check import check_mesh, format_report
 from gmsh_crossquad.compare import _distance, compare
+from gmsh_crossquad.fill.pipeline import fill
+from gmsh_crossquad.surfaces import Planes
 from tests.models import disc, two_materials, two_squares
 from tests.results import two_squares_mesh
+from tests.test_fill_surfaces import tube, uniform
 
 GROUPS = {(1, "left"): (6,), (2, "right square"): (2,)}
 
@@ -31,8 +34,12 @@ def arrays(**changes):
     return replace(good, **changes)
 
 
+def compared(mesh, model, groups):
+    return compare(check_mesh(mesh), mesh, model, Planes(model), groups, np.full(len(model.faces), np.nan))
+
+
 def judged(mesh, groups=GROUPS):
-    return compare(check_mesh(mesh), mesh, two_squares(), groups)
+    return compared(mesh, two_squares(), groups)
 
 
 def test_a_good_mesh_has_no_faults():
@@ -172,7 +179,7 @@ def octagon(radius):
 def test_chords_of_a_circle_may_cut_off_their_segments_but_no_more(radius, faults):
     # the octagon lacks 10 % of the disc; one that is smaller by a fifth is another shape
     mesh, model = octagon(radius)
-    report = compare(check_mesh(mesh), mesh, model, {(2, "disc"): (2,)})
+    report = compared(mesh, model, {(2, "disc"): (2,)})
     assert report.inverted == 0
     assert len([f for f in report.faults if "'disc'" in f]) == faults
 
@@ -197,7 +204,7 @@ def test_an_edge_that_cuts_across_a_curve_is_a_fault(last, faults):
     points = (points + radius * np.c_[np.cos(angle), np.sin(angle), np.zeros(4)]) * model.scale + model.origin
     one = np.ones(1, np.int64)
     mesh = arrays(points=points, quads=np.arange(4)[None], quad_entity=one, lines=np.zeros((0, 2), np.int64), groups={})
-    report = compare(check_mesh(mesh), mesh, model, {})
+    report = compared(mesh, model, {})
     assert len([f for f in report.faults if "does not follow curve" in f]) == faults
 
 
@@ -213,3 +220,77 @@ def test_no_quads_is_a_fault():
     report = judged(arrays(quads=none, quad_entity=none[:, 0]))
     assert "no quads" in report.faults
     assert np.isnan(report.min_scaled_jacobian)
+
+
+def tube_arrays(k=4):
+    """A tube with its exact area, and its mesh as if read from a file."""
+    model, surface, guide, evaluate = tube(8, 2)
+    mesh = fill(model, surface, guide, uniform(guide, k), evaluate)
+    lines = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes])
+    return (
+        model,
+        surface,
+        arrays(
+            points=mesh.points,
+            quads=mesh.quads,
+            quad_entity=mesh.quad_face + 1,
+            lines=lines,
+            line_entity=np.repeat([1, 2], 8 * k),
+            groups={(2, "skin"): (1,)},
+        ),
+    )
+
+
+def compared_tube(model, surface, mesh):
+    area = np.array([2 * np.pi * 0.2 * 0.5])
+    return compare(check_mesh(mesh), mesh, model, surface, {(2, "skin"): (1,)}, area)
+
+
+def test_a_mesh_of_a_tube_has_no_faults():
+    model, surface, mesh = tube_arrays()
+    report = compared_tube(model, surface, mesh)
+    assert report.faults == ()
+    assert (report.inverted, report.irregular, report.hanging) == (0, 0, 0)
+
+
+@pytest.mark.parametrize("entity", [1, 7])
+def test_a_node_beside_a_curved_face_is_a_fault(entity):
+    model, surface, mesh = tube_arrays()
+    mesh = replace(mesh, quad_entity=np.full(len(mesh.quads), entity), groups={})
+    assert compared_tube(model, surface, mesh).faults == ()
+    inner = np.setdiff1d(np.arange(len(mesh.points)), mesh.lines)
+    mesh.points[inner[:3]] += [0.0, 0.0, 1e-3]  # along the tube
+    assert compared_tube(model, surface, mesh).faults == ()
+    mesh.points[inner[:3], :2] += (mesh.points[inner[:3], :2] - model.origin[:2]) * 1e-3
+    assert compared_tube(model, surface, mesh).faults == ("3 nodes are not on the faces of the model",)
+
+
+def test_a_tube_that_is_too_coarse_lacks_area():
+    # a hexagonal prism lacks 4.5 %, and more where its free edges bound what may be cut off
+    model, surface, guide, evaluate = tube(3, 1)
+    mesh = fill(model, surface, guide, uniform(guide, 1), evaluate)
+    lines = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes])
+    ones = np.ones(len(mesh.quads), np.int64)
+    coarse = arrays(points=mesh.points, quads=mesh.quads, quad_entity=ones, lines=lines, line_entity=ones, groups={})
+    assert any("area" in f for f in compared_tube(model, surface, coarse).faults)
+
+
+def test_a_folded_cell_of_a_tube_is_inverted():
+    """The inner nodes of one ring are moved past the next ring: the cells between lie against their neighbours."""
+    _, _, mesh = tube_arrays()
+    z = np.unique(np.round(mesh.points[:, 2], 9))
+    second = np.abs(mesh.points[:, 2] - z[2]) < 1e-6
+    mesh.points[second, 2] = z[3] + 0.3 * (z[4] - z[3])
+    report = check_mesh(mesh)
+    assert report.inverted == 32
+    assert report.min_scaled_jacobian == pytest.approx(-1.0, abs=1e-3)
+
+
+def test_a_crease_along_a_line_is_no_fold():
+    # two squares of one surface that meet at 60 degrees, with and without the line between them
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0, 0.75**0.5], [0.5, 1, 0.75**0.5]])
+    quads = np.array([[0, 1, 2, 3], [0, 3, 5, 4]])
+    ones = np.ones(2, np.int64)
+    mesh = arrays(points=points, quads=quads, quad_entity=ones, lines=np.zeros((0, 2), np.int64), groups={})
+    assert check_mesh(mesh).inverted == 2
+    assert check_mesh(replace(mesh, lines=np.array([[3, 0]]), line_entity=ones[:1])).inverted == 0

@@ -11,6 +11,7 @@ from gmsh_crossquad.fill.curve_edges import BULGE, MOST_GRADED, chords_to_divide
 from gmsh_crossquad.fill.curve_fit import misfits
 from gmsh_crossquad.fill.numbering import guide_chords
 from gmsh_crossquad.fill.pipeline import _with_bundle
+from gmsh_crossquad.surfaces import Planes
 from tests.smoothing_grids import mapped_grid, rectangle, sector
 
 
@@ -20,7 +21,7 @@ def test_only_a_bulging_edge_is_divided(height: float, both: bool) -> None:
     bulge = 0.75 * 0.75 / 8
     assert (bulge > BULGE * height) != both
     _, quad_edges, chord, n = guide_chords(guide.quads)
-    found = chords_to_divide(model, guide, np.array([0]))
+    found = chords_to_divide(model, Planes(model), guide, np.array([0]))
     along = chord[quad_edges[0][np.argmin(guide.curve[guide.quads[0]] < 0)]]
     assert along in range(n)
     assert len(found) == (2 if both else 1)

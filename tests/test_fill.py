@@ -19,6 +19,7 @@ from gmsh_crossquad.fill.numbering import guide_chords, guide_topology
 from gmsh_crossquad.fill.pipeline import fill, poor_cells
 from gmsh_crossquad.fill.tangents import continuation, cubic, end_tangents
 from gmsh_crossquad.records import Float, Guide, Int, Model, QuadMesh
+from gmsh_crossquad.surfaces import Planes
 
 from . import models
 from .guides import grid, hole_in_plate, make_guide, ring, straight
@@ -286,7 +287,7 @@ def test_rectangle_becomes_a_regular_grid(k: int, m: int) -> None:
     along_x = np.abs(np.diff(guide.points[edges], axis=1)[:, 0, 0]) > 1e-6
     divisions = np.full(count, m)
     divisions[chord[along_x]] = k
-    mesh = fill(model, guide, divisions, straight(model))
+    mesh = fill(model, Planes(model), guide, divisions, straight(model))
     assert len(mesh.quads) == 6 * k * m
     check_record(model, mesh, [1] * 4)
     x, y = mesh.points[:, 0] * k, mesh.points[:, 1] * m
@@ -300,7 +301,7 @@ def test_rectangle_becomes_a_regular_grid(k: int, m: int) -> None:
 @pytest.mark.parametrize("k", [1, 2, 7])
 def test_annulus_is_polar(k: int) -> None:
     model, guide, evaluate = ring(8, 1)
-    mesh = fill(model, guide, uniform(guide, k), evaluate)
+    mesh = fill(model, Planes(model), guide, uniform(guide, k), evaluate)
     check_record(model, mesh, [1, 1])
     r = np.hypot(mesh.points[:, 0], mesh.points[:, 1])
     a = np.arctan2(mesh.points[:, 1], mesh.points[:, 0]) / (np.pi / 4 / k)
@@ -318,7 +319,7 @@ def test_faces_share_the_nodes_of_their_curve(k: int) -> None:
     model = models.two_squares()
     xy = [(0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (0, 1)]
     guide = make_guide(model, xy, [(1, 2, 3, 4), (0, 1, 4, 5)], [(0, 1), (1, 2), (2, 3), (3, 4), (4, 5), (5, 0), (1, 4)], [1, 0])
-    mesh = fill(model, guide, uniform(guide, k), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, k), straight(model))
     check_record(model, mesh, [1, 1, 1, 1, 1, 1, 2])
     assert np.array_equal(mesh.quad_face, np.repeat([0, 1], k * k))
     assert np.array_equal(mesh.quad_block, np.repeat([1, 0], k * k))
@@ -333,7 +334,7 @@ def test_crack_and_embedded_point_carry_nodes() -> None:
     quads = np.stack([g[:-1, :-1], g[1:, :-1], g[1:, 1:], g[:-1, 1:]], axis=2).reshape(-1, 4)
     chains = [g[:, 0], g[-1], g[::-1, -1], g[0, ::-1], [4, 7]]
     guide = make_guide(model, [(a, b) for a in x for b in y], quads, chains)
-    mesh = fill(model, guide, uniform(guide, 4), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, 4), straight(model))
     check_record(model, mesh, [1, 1, 1, 1, 2])
     np.testing.assert_allclose(mesh.points[mesh.curve_nodes[4], 0], [0.3, 0.4, 0.5, 0.6, 0.7], atol=1e-14)
     assert area(mesh) == pytest.approx(1, abs=1e-12)
@@ -347,7 +348,7 @@ def test_embedded_point_is_a_vertex_node() -> None:
     guide = make_guide(model, xy, quads, [g[:, 0], g[-1], g[::-1, -1], g[0, ::-1]])
     cad = guide.cad_vertex.copy()
     cad[4] = 4
-    mesh = fill(model, replace(guide, cad_vertex=cad), uniform(guide, 3), straight(model))
+    mesh = fill(model, Planes(model), replace(guide, cad_vertex=cad), uniform(guide, 3), straight(model))
     check_record(model, mesh, [1] * 4)
     np.testing.assert_allclose(mesh.points[mesh.vertex_node[4]], [0.4, 0.6, 0], atol=1e-15)
 
@@ -358,7 +359,7 @@ def test_any_divisions_give_a_conforming_mesh(seed: int) -> None:
     rng = np.random.default_rng(seed)
     model, guide, evaluate = hole_in_plate(2)
     divisions = rng.integers(1, 6, n_chords(guide))
-    mesh = fill(model, guide, divisions, evaluate)
+    mesh = fill(model, Planes(model), guide, divisions, evaluate)
     check_record(model, mesh, [1] * 5)
     _, quad_edges, chord, _ = guide_chords(guide.quads)
     assert len(mesh.quads) == divisions[chord[quad_edges[:, 0]]] @ divisions[chord[quad_edges[:, 1]]]
@@ -392,9 +393,9 @@ def test_mesh_moves_with_the_model(seed: int, factor: float) -> None:
     turn *= np.sign(np.linalg.det(turn))
     shift = factor * rng.uniform(-5, 5, 3)
     model, guide, evaluate = hole_in_plate(2)
-    a = fill(model, guide, uniform(guide, 4), evaluate)
+    a = fill(model, Planes(model), guide, uniform(guide, 4), evaluate)
     model2, guide2 = moved(model, guide, turn, factor, shift)
-    b = fill(model2, guide2, uniform(guide, 4), lambda row, t: factor * evaluate(row, t) @ turn.T + shift)
+    b = fill(model2, Planes(model2), guide2, uniform(guide, 4), lambda row, t: factor * evaluate(row, t) @ turn.T + shift)
     np.testing.assert_allclose((b.points - shift) / factor @ turn, a.points, atol=1e-11)
     assert np.array_equal(a.quads, b.quads)
 
@@ -403,7 +404,7 @@ def test_mesh_moves_with_the_model(seed: int, factor: float) -> None:
 def test_nodes_of_a_horizontal_face_have_one_height(height: float) -> None:
     model, guide, evaluate = hole_in_plate(2)
     model, guide = moved(model, guide, np.eye(3), 1.0, np.array([0, 0, height]))
-    mesh = fill(model, guide, uniform(guide, 5), lambda row, t: evaluate(row, t) + [0, 0, height])
+    mesh = fill(model, Planes(model), guide, uniform(guide, 5), lambda row, t: evaluate(row, t) + [0, 0, height])
     assert np.all(mesh.points[:, 2] == height)
 
 
@@ -425,14 +426,14 @@ def test_renumbering_the_guide_moves_no_node(seed: int) -> None:
         quads=quads,
         chains=tuple(new[c] for c in guide.chains),
     )
-    a, b = (fill(model, g, uniform(g, 4), evaluate) for g in (guide, other))
+    a, b = (fill(model, Planes(model), g, uniform(g, 4), evaluate) for g in (guide, other))
     order = lambda p: p[np.lexsort(np.round(p, 9).T)]  # noqa: E731
     np.testing.assert_allclose(order(a.points), order(b.points), atol=1e-12)
 
 
 def test_two_runs_are_equal_to_the_bit() -> None:
     model, guide, evaluate = hole_in_plate(3)
-    a, b = (fill(model, guide, uniform(guide, 6), evaluate) for _ in range(2))
+    a, b = (fill(model, Planes(model), guide, uniform(guide, 6), evaluate) for _ in range(2))
     assert a.points.tobytes() == b.points.tobytes() and a.quads.tobytes() == b.quads.tobytes()
 
 
@@ -442,7 +443,7 @@ def test_sizes_do_not_jump_between_cells() -> None:
     model, guide = grid(4, 2, 15.0, 2.0)
     g = np.arange(15).reshape(5, 3)
     guide = make_guide(model, [(a, b) for a in xs for b in (0, 1, 2)], guide.quads, [g[:, 0], g[-1], g[::-1, -1], g[0, ::-1]])
-    mesh = fill(model, guide, uniform(guide, 32), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, 32), straight(model))
     steps = np.diff(np.unique(np.round(mesh.points[np.abs(mesh.points[:, 1] - 1) < 1e-9, 0], 9)))
     assert len(steps) == 128
     ratio = steps[1:] / steps[:-1]
@@ -464,12 +465,12 @@ def test_cells_beside_bulging_edges_do_not_fold(monkeypatch: pytest.MonkeyPatch)
     model, guide = step()
     own = scaled_jacobian(guide.points, guide.quads, UP)
     assert own.min() > 0
-    mesh = fill(model, guide, uniform(guide, 8), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, 8), straight(model))
     quality = scaled_jacobian(mesh.points, mesh.quads, UP)
     assert quality.min() > 0
     monkeypatch.setattr(pipeline, "SHARES", ())
     with pytest.raises(MeshError, match="fold"):
-        fill(model, guide, uniform(guide, 8), straight(model))
+        fill(model, Planes(model), guide, uniform(guide, 8), straight(model))
 
 
 def test_sides_of_a_thin_cell_do_not_shear_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -479,10 +480,10 @@ def test_sides_of_a_thin_cell_do_not_shear_it(monkeypatch: pytest.MonkeyPatch) -
     xy = [*corners, (0.02, 1), (0, 0.003), (0.02, 0.003), (1, 0.003)]
     quads = [(0, 1, 7, 6), (1, 2, 8, 7), (6, 7, 5, 4), (7, 8, 3, 5)]
     guide = make_guide(model, xy, quads, [(0, 1), (1, 2), (2, 8, 3), (3, 5, 4), (4, 6, 0)])
-    mesh = fill(model, guide, uniform(guide, 16), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() > 0.5
     monkeypatch.setattr(pipeline, "SHARES", ())
-    mesh = fill(model, guide, uniform(guide, 16), straight(model))
+    mesh = fill(model, Planes(model), guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() < 0.3
 
 
@@ -504,22 +505,22 @@ def bulge(height: float) -> tuple[Model, Guide, Callable[[int, Float], Float]]:
 def test_a_cell_that_a_curve_fills_is_refused_with_its_place() -> None:
     model, guide, evaluate = bulge(0.45)
     with pytest.raises(MeshError, match=r"fold when they are filled, surface 1 at \(0\.5, 0\.15, 0\)"):
-        fill(model, guide, uniform(guide, 8), evaluate)
-    poor, folded = poor_cells(model, guide, uniform(guide, 8), evaluate)
+        fill(model, Planes(model), guide, uniform(guide, 8), evaluate)
+    poor, folded = poor_cells(model, Planes(model), guide, uniform(guide, 8), evaluate)
     assert poor.tolist() == [0]
     assert folded.tolist() == [0]
 
 
 def test_a_good_guide_has_no_poor_cells() -> None:
     model, guide, evaluate = bulge(0.05)
-    assert [len(rows) for rows in poor_cells(model, guide, uniform(guide, 8), evaluate)] == [0, 0]
+    assert [len(rows) for rows in poor_cells(model, Planes(model), guide, uniform(guide, 8), evaluate)] == [0, 0]
 
 
 def test_inverted_guide_quads_are_noted() -> None:
     model, guide = grid(3, 3)
     p = guide.points.copy()
     p[5] = p[10] + 0.1
-    mesh = fill(model, replace(guide, points=p), uniform(guide, 2), straight(model))
+    mesh = fill(model, Planes(model), replace(guide, points=p), uniform(guide, 2), straight(model))
     assert len(mesh.notes) == 1 and "inverted guide quads" in mesh.notes[0]
 
 
@@ -529,20 +530,20 @@ def test_inverted_guide_quads_are_noted() -> None:
 def test_wrong_number_of_divisions() -> None:
     model, guide = grid(2, 2)
     with pytest.raises(MeshError, match="3 divisions for 4"):
-        fill(model, guide, np.array([1, 1, 1]), straight(model))
+        fill(model, Planes(model), guide, np.array([1, 1, 1]), straight(model))
 
 
 def test_division_zero() -> None:
     model, guide = grid(2, 2)
     with pytest.raises(MeshError, match="no division"):
-        fill(model, guide, np.array([1, 0, 1, 1]), straight(model))
+        fill(model, Planes(model), guide, np.array([1, 0, 1, 1]), straight(model))
 
 
 def test_chain_that_is_not_in_the_guide() -> None:
     model, guide = grid(2, 2)
     chains = (guide.chains[0][[0, 2]], *guide.chains[1:])
     with pytest.raises(MeshError, match="gap on curve row 0"):
-        fill(model, replace(guide, chains=chains), np.ones(4, int), straight(model))
+        fill(model, Planes(model), replace(guide, chains=chains), np.ones(4, int), straight(model))
 
 
 def test_open_inner_edge() -> None:
@@ -550,13 +551,13 @@ def test_open_inner_edge() -> None:
     keep = [0, 1, 2]
     parts = {name: getattr(guide, name)[keep] for name in ("quads", "quad_face", "quad_block", "quad_size")}
     with pytest.raises(MeshError, match=r"gap|not conforming"):
-        fill(model, replace(guide, **parts), np.ones(n_chords(replace(guide, **parts)), int), straight(model))
+        fill(model, Planes(model), replace(guide, **parts), np.ones(n_chords(replace(guide, **parts)), int), straight(model))
 
 
 def test_unknown_filler() -> None:
     model, guide = grid(1, 1)
     with pytest.raises(InputError, match="unknown filler"):
-        fill(model, guide, np.ones(2, int), straight(model), filler="other")
+        fill(model, Planes(model), guide, np.ones(2, int), straight(model), filler="other")
 
 
 # Gmsh's mesher
@@ -567,12 +568,12 @@ def test_gmsh_follows_the_same_rule(n: int) -> None:
     gmsh = pytest.importorskip("gmsh")
     model, guide, evaluate = hole_in_plate(n)
     divisions = np.arange(n_chords(guide)) % 4 + 1
-    a = fill(model, guide, divisions, evaluate)
+    a = fill(model, Planes(model), guide, divisions, evaluate)
     gmsh.initialize(readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         before = gmsh.model.list(), gmsh.option.getNumber("Mesh.MeshOnlyVisible")
-        b = fill(model, guide, divisions, evaluate, filler="gmsh")
+        b = fill(model, Planes(model), guide, divisions, evaluate, filler="gmsh")
         assert (gmsh.model.list(), gmsh.option.getNumber("Mesh.MeshOnlyVisible")) == before
     finally:
         gmsh.finalize()

@@ -17,6 +17,7 @@ from gmsh_crossquad.fill.numbering import guide_chords
 from gmsh_crossquad.fill.pipeline import fill
 from gmsh_crossquad.options import MeshOptions
 from gmsh_crossquad.records import Model, QuadMesh
+from gmsh_crossquad.surfaces import Planes
 
 from .guides import hole_in_plate, make_guide, project
 
@@ -75,7 +76,7 @@ def mesh_of_plate(k: int, n: int = 2) -> tuple[Model, QuadMesh]:
     assert len(chains) == len(model.curves) == 5
     guide = make_guide(model, xyz, guide.quads, chains)
     divisions = np.full(guide_chords(guide.quads)[3], k)
-    return model, fill(model, guide, divisions, lambda row, t: curve_points(model, row, t), vertex_points(model))
+    return model, fill(model, Planes(model), guide, divisions, lambda row, t: curve_points(model, row, t), vertex_points(model))
 
 
 def test_vertices_are_exact(session: None) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from gmsh_crossquad.block_layout import build_layout
 from gmsh_crossquad.errors import MeshError
-from gmsh_crossquad.quality import measure_quality, twins
+from gmsh_crossquad.quality import measure_quality, quad_quality, twins
 from gmsh_crossquad.records import QuadMesh
 from tests.models import annulus
 from tests.results import NX, NY, hand_made, two_squares_mesh
@@ -161,3 +161,57 @@ def test_a_ring_is_one_block_that_is_cut_once():
     assert sorted(sign for edge, sign in block.sides if edge == cut) == [-1, 1]
     assert layout.edges[cut].divisions == rows
     assert {int(layout.edges[cut].nodes[0]), int(layout.edges[cut].nodes[-1])} & set(mesh.vertex_node.tolist())
+
+
+def rolled_up(n=12, rows=5):
+    """A strip of n x rows quads on a tube of radius 1, not closed."""
+    a, z = np.meshgrid(np.radians(20.0) * np.arange(n + 1), np.arange(rows + 1) / 3, indexing="ij")
+    node = np.arange(a.size).reshape(a.shape)
+    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(-1, 4)
+    outline = np.concatenate([node[:, 0], node[-1, 1:], node[-2::-1, -1], node[0, -2::-1]])
+    return QuadMesh(
+        points=np.stack([np.cos(a), np.sin(a), z], axis=-1).reshape(-1, 3),
+        quads=quads,
+        quad_face=np.zeros(len(quads), np.int64),
+        quad_block=np.zeros(len(quads), np.int64),
+        vertex_node=np.array([0]),
+        curve_nodes=(outline,),
+        curve_parameters=(np.linspace(0, 1, len(outline)),),
+        face_nodes=(node[1:-1, 1:-1].ravel(),),
+    )
+
+
+CURVED = np.full((1, 3), np.nan)
+
+
+def test_quads_of_a_curved_face_are_judged_by_themselves():
+    quality = measure_quality(rolled_up(), CURVED)
+    assert (quality.inverted, quality.irregular, quality.conforming) == (0, 0, True)
+    assert quality.min_scaled_jacobian == pytest.approx(1.0)
+
+
+def test_a_quad_that_lies_against_its_neighbours_is_inverted():
+    mesh = rolled_up()
+    x = mesh.points.reshape(13, 6, 3).copy()
+    x[4:8, 2, 2] = 1.2  # part of one row of nodes beyond the next row, at z = 1: three quads turned over, two crossed
+    quality = measure_quality(replace(mesh, points=x.reshape(-1, 3)), CURVED)
+    assert quality.inverted == 5
+    value = quad_quality(replace(mesh, points=x.reshape(-1, 3)), CURVED)
+    turned = {(3 + i) * 5 + 2 for i in range(5)}
+    assert set(np.flatnonzero(value <= 0).tolist()) == turned
+
+
+def test_plane_and_curved_faces_in_one_mesh():
+    mesh, tube = two_squares_mesh(), rolled_up()
+    n = len(mesh.points)
+    both = replace(
+        mesh,
+        points=np.vstack([mesh.points, tube.points]),
+        quads=np.vstack([mesh.quads[:, ::-1], tube.quads + n]),
+        quad_face=np.concatenate([mesh.quad_face, tube.quad_face + 2]),
+        quad_block=np.concatenate([mesh.quad_block, tube.quad_block + 9]),
+        curve_nodes=(*mesh.curve_nodes, tube.curve_nodes[0] + n),
+    )
+    value = quad_quality(both, np.vstack([UP, CURVED]))
+    assert value[: len(mesh.quads)] == pytest.approx(-1.0)
+    assert value[len(mesh.quads) :] == pytest.approx(1.0)

@@ -1,17 +1,20 @@
 """The guide quads as structured grids: positions inside, quality and fine quads.
 
-Cells of equal size are worked on together, up to `CHUNK` nodes.
+Cells of equal size are worked on together, up to `CHUNK` nodes.  Those of plane faces are filled in the plane; those of curved
+faces in space: all their inner nodes are put on their surfaces at once, and the fine quads are judged against their own normals
+on the side of the surface's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..records import Bool, Float, Guide, Int
-from .coons import coons, grid_quads, grid_quality
+from ..surfaces import Surfaces
+from .coons import coons, grid_quads, grid_quality, surface_quality
 from .numbering import GuideTopology, Numbering, edge_nodes
 from .skeleton import Frames, Skeleton
 
@@ -19,6 +22,7 @@ __all__ = ["Cells"]
 
 CHUNK = 1 << 16  # grid nodes at a time: fewer calls matter more than the innermost cache
 LONG = 64  # rows from which a slice is faster than an index array
+SAMPLES = 8  # normals of the surface per cell and direction: a guide cell turns by less than a right angle
 
 # corner where each side starts and ends when it runs with u or v
 SIDES = ((0, 1), (1, 2), (3, 2), (0, 3))
@@ -33,6 +37,7 @@ class Cells:
     numbering: Numbering
     skeleton: Skeleton
     frames: Frames
+    surfaces: Surfaces
 
     @property
     def divisions(self) -> Int:
@@ -60,12 +65,32 @@ class Cells:
 
     def corner_quality(self) -> Float:
         """(q,) least scaled Jacobian of the guide quads themselves."""
-        x = self.frames.local(self.skeleton.vertices[self.guide.quads], self.guide.quad_face)
-        return grid_quality(x[:, :, [0, 3, 1, 2]].reshape(2, -1, 2, 2))
+        corners, face = self.skeleton.vertices[self.guide.quads], self.guide.quad_face
+        plane, curved = self._kinds(np.arange(len(face)))
+        out = np.empty(len(face))
+        x = self.frames.local(corners[plane], face[plane])
+        out[plane] = grid_quality(x[:, :, [0, 3, 1, 2]].reshape(2, -1, 2, 2))
+        if len(curved):
+            x = np.moveaxis(corners[curved][:, [0, 3, 1, 2]], -1, 0).reshape(3, -1, 2, 2)
+            out[curved] = surface_quality(x, self._normals([(curved, x)])[0])
+        return out
 
     def place(self, which: Int, points: Float) -> Float:
         """Fill the cells `which`, write their inner nodes to `points` and return their least scaled Jacobian (m,)."""
+        plane, curved = self._kinds(which)
         worst = np.empty(len(self.guide.quads))
+        self._place_plane(plane, points, worst)
+        if len(curved):
+            self._place_curved(curved, points, worst)
+        return worst[which]
+
+    def _kinds(self, which: Int) -> tuple[Int, Int]:
+        """The cells of plane and of curved faces among `which`."""
+        curved = self.frames.curved[self.guide.quad_face[which]]
+        return which[~curved], which[curved]
+
+    def _place_plane(self, which: Int, points: Float, worst: Float) -> None:
+        """`place` for cells of plane faces; their quality goes to `worst` (q,)."""
         for q, ku, kv in self.groups(which):
             face = self.guide.quad_face[q]
             grid = coons(*(self.frames.local(self._side(q, s, (ku, kv)[s % 2]), face) for s in range(4)))
@@ -73,7 +98,40 @@ class Cells:
             if ku > 1 and kv > 1:
                 inside = grid[:, :, 1:-1, 1:-1].reshape(2, len(q), -1)
                 _put(points, self.numbering.cell_first[q], self.frames.user(inside, face))
-        return worst[which]
+
+    def _place_curved(self, which: Int, points: Float, worst: Float) -> None:
+        """`place` for cells of curved faces; their quality goes to `worst` (q,)."""
+        parts = [
+            (q, coons(*(np.moveaxis(self._side(q, s, (ku, kv)[s % 2]), -1, 0) for s in range(4))))
+            for q, ku, kv in self.groups(which)
+        ]
+        inside = [grid[:, :, 1:-1, 1:-1] for _, grid in parts]
+        for (q, _), part, feet in zip(parts, inside, self._at_once(self.surfaces.feet, parts, inside)):
+            part[:] = feet
+            rows = np.moveaxis(feet, 0, -1).reshape(len(q), feet.shape[2] * feet.shape[3], 3)
+            if rows.shape[1]:
+                _put(points, self.numbering.cell_first[q], self.frames.user_of_scaled(rows))
+        for (q, grid), normals in zip(parts, self._normals(parts)):
+            worst[q] = surface_quality(grid, normals)
+
+    def _normals(self, parts: list[tuple[Int, Float]]) -> list[Float]:
+        """Surface normals (3, m, ku, kv) at the quads of grids, from up to `SAMPLES` quads per direction."""
+        middles, rows = [], []
+        for _, grid in parts:
+            some = [(np.arange(s) * 2 + 1) * k // (2 * s) for k in np.array(grid.shape[2:]) - 1 for s in [min(k, SAMPLES)]]
+            i, j = some[0][:, None], some[1]
+            middles.append(0.25 * (grid[:, :, i, j] + grid[:, :, i + 1, j] + grid[:, :, i + 1, j + 1] + grid[:, :, i, j + 1]))
+            rows.append([np.arange(k - 1) * len(x) // (k - 1) for k, x in zip(grid.shape[2:], some)])
+        normals = self._at_once(self.surfaces.normals, parts, middles)
+        return [n if n.shape[2:] == (len(u), len(v)) else n[:, :, u[:, None], v] for n, (u, v) in zip(normals, rows)]
+
+    def _at_once(self, what: Callable[[Int, Float], Float], parts: list[tuple[Int, Float]], grids: list[Float]) -> list[Float]:
+        """A function of `Surfaces` for the points of all `grids` (3, m, i, j), in one call."""
+        face = [np.repeat(self.guide.quad_face[q], g.shape[2] * g.shape[3]) for (q, _), g in zip(parts, grids)]
+        points = np.concatenate([g.reshape(3, -1) for g in grids], axis=1).T
+        found = what(np.concatenate(face), np.ascontiguousarray(points)).T if len(points) else points.T
+        ends = np.cumsum([len(f) for f in face])[:-1]
+        return [part.reshape(g.shape) for part, g in zip(np.split(found, ends, axis=1), grids)]
 
     def _side(self, q: Int, side: int, count: int) -> Float:
         """Positions (m, count + 1, 3) of a side, with u or v."""

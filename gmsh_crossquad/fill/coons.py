@@ -12,7 +12,7 @@ import numpy as np
 
 from ..records import Float, Int
 
-__all__ = ["coons", "grid_quads", "grid_quality"]
+__all__ = ["coons", "grid_quads", "grid_quality", "surface_quality"]
 
 
 def coons(bottom: Float, right: Float, top: Float, left: Float) -> Float:
@@ -85,6 +85,42 @@ def grid_quality(grid: Float) -> Float:
             sine -= a[1] * b[0]
             np.minimum(worst, sine.min(axis=(1, 2)), out=worst)
     return worst
+
+
+def surface_quality(grid: Float, normals: Float) -> Float:
+    """Least scaled Jacobian of grids on curved faces, every quad against its own area vector on the side of the surface's normal.
+
+    Parameters
+    ----------
+    grid : (3, m, ku + 1, kv + 1) float64
+    normals : (3, m, ku, kv) float64
+        Of the surface at every quad.
+
+    Returns
+    -------
+    (m,) float64
+        Minimum over all quads and corners of the sine of the corner angle, signed.
+    """
+    tiny = np.finfo(float).tiny
+    area = _cross(grid[:, :, 1:, 1:] - grid[:, :, :-1, :-1], grid[:, :, :-1, 1:] - grid[:, :, 1:, :-1])
+    side = area[0] * normals[0] + area[1] * normals[1] + area[2] * normals[2]
+    length = np.sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2])
+    area *= np.where(side < 0, -1.0, 1.0) / np.maximum(length, tiny)
+    du, dv = grid[:, :, 1:] - grid[:, :, :-1], grid[:, :, :, 1:] - grid[:, :, :, :-1]
+    for d in (du, dv):
+        d /= np.maximum(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), tiny)
+    worst = np.ones(grid.shape[1])
+    for a in (du[..., :-1], du[..., 1:]):
+        for b in (dv[:, :, :-1], dv[:, :, 1:]):
+            corner = _cross(a, b)
+            corner *= area
+            np.minimum(worst, corner.sum(axis=0).min(axis=(1, 2)), out=worst)
+    return worst
+
+
+def _cross(a: Float, b: Float) -> Float:
+    """Cross products of vectors (3, ...)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def grid_quads(nodes: Int) -> Int:

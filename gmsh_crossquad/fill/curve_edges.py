@@ -1,8 +1,11 @@
-"""Chords of a guide grid that should get more edges, judged by the guide's edges on CAD curves.
+"""Chords of a guide grid that should get more edges, judged by the guide's edges on CAD curves and in curved faces.
 
 An edge of length l over which the curve turns by t bulges by l t / 8 from its chord.  Where that is much of the height of the
 cell beside it the cell folds: the edge needs division, the height none.  Final edges may turn by no more than a limit, and an
 edge far from its neighbours, measured in their lengths (`curve_fit`), is halved without smoothing again.
+
+Inside a curved face an edge turns as the surface's normal does, from one end to the middle to the other end.  A chord that turns
+by t is shorter than its arc by t^2 / 24 of it, so a final quad loses that part of its area in both directions.
 """
 
 from __future__ import annotations
@@ -10,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..layout.divisions import cumulative_turning
-from ..records import Float, Guide, Int, Model
+from ..records import Bool, Float, Guide, Int, Model
+from ..surfaces import Surfaces
 from .curve_fit import misfits
 from .numbering import guide_chords
 
@@ -28,14 +32,16 @@ GRADINGS = 6
 MOST_GRADED = 1.5
 
 
-def chords_to_divide(model: Model, guide: Guide, bad: Int) -> Int:
-    """Chords of the guide whose division makes bad cells better: only that along a curve edge, where the curve bulges over it
-    by much of the cell's height; else both."""
+def chords_to_divide(model: Model, surfaces: Surfaces, guide: Guide, bad: Int) -> Int:
+    """Chords of the guide whose division makes bad cells better: only that along an edge over which a curve or a curved face
+    bulges by much of the cell's height; else both."""
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
-    bulge = np.zeros(len(edges))
-    for row, length, turn in _curve_edges(model, guide, edges):
-        bulge[row] = length * turn / 8.0
     length = np.linalg.norm(guide.points[edges[:, 1]] - guide.points[edges[:, 0]], axis=1)
+    row, _, turn = _surface_turning(surfaces, guide, edges, quad_edges)
+    bulge = np.zeros(len(edges))
+    np.maximum.at(bulge, row, length[row] * turn / 8.0)
+    for row, arc, turn in _curve_edges(model, guide, edges):
+        bulge[row] = arc * turn / 8.0
     mine = quad_edges[bad]
     height = np.minimum(length[np.roll(mine, 1, axis=1)], length[np.roll(mine, -1, axis=1)])
     over = bulge[mine] > BULGE * height
@@ -56,19 +62,40 @@ def _curve_edges(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Floa
     return out
 
 
-def steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
-    """Guide chords of edges on CAD curves that the final edges do not follow well enough.
+def _surface_turning(surfaces: Surfaces, guide: Guide, edges: Int, quad_edges: Int) -> tuple[Int, Int, Float]:
+    """Row of every edge of every curved face (ordered by face), that face, and by what its normal turns along the edge."""
+    q = np.flatnonzero(surfaces.curved[guide.quad_face])
+    if not len(q):
+        return np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0)
+    face, row = np.divmod(np.unique(guide.quad_face[q, None] * len(edges) + quad_edges[q]), len(edges))
+    ends = guide.points[edges[row]]
+    places = np.concatenate([ends[:, 0], 0.5 * (ends[:, 0] + ends[:, 1]), ends[:, 1]])
+    start, middle, end = surfaces.normals(np.tile(face, 3), places).reshape(3, -1, 3)
+    return row, face, _angle(start, middle) + _angle(middle, end)
 
-    An edge may turn by `STEEP`.  An edge of length l that turns by t cuts about l^2 t / 12 off; where that adds up to more than
-    `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.
+
+def _angle(a: Float, b: Float) -> Float:
+    """Angles (n,) between unit vectors (n, 3)."""
+    out: Float = 2.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+    return out
+
+
+def steep_chords(model: Model, surfaces: Surfaces, guide: Guide, fine: Int) -> Int:
+    """Guide chords of edges on CAD curves and in curved faces that the final edges do not follow well enough.
+
+    An edge may turn by `STEEP`.  An edge of length l on a curve that turns by t within a face cuts about l^2 t / 12 off; where
+    that adds up to more than `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.  So may those of
+    curved faces that lose more than that part of their area, if the model or a physical surface does so as a whole.
     """
-    edges, _, chord, _ = guide_chords(guide.quads)
+    edges, quad_edges, chord, _ = guide_chords(guide.quads)
     diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
     areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
-    face_area = np.bincount(guide.quad_face, areas, minlength=len(model.faces))
+    face_area: Float = np.bincount(guide.quad_face, areas, minlength=len(model.faces)).astype(np.float64)
+    curves = _curve_edges(model, guide, edges)
+    bent, bent_face, bend = _surface_turning(surfaces, guide, edges, quad_edges)
     rows, turns = [], []
     lost = np.zeros(len(model.curves))
-    for c, (row, length, turn) in enumerate(_curve_edges(model, guide, edges)):
+    for c, (row, length, turn) in enumerate(curves):
         pieces = fine[chord[row]]
         rows.append(row)
         turns.append(turn / pieces)
@@ -76,12 +103,41 @@ def steep_chords(model: Model, guide: Guide, fine: Int) -> Int:
     limit = np.full(len(model.curves), STEEP)
     for f, face in enumerate(model.faces):
         around = [c for loop in face.loops for c, _ in loop]
-        if lost[around].sum() > LOST * face_area[f]:
+        off = lost[around].sum()
+        if face.curved:  # what the curve turns with the surface cuts nothing off
+            with_face = np.zeros(len(edges))
+            with_face[bent[bent_face == f]] = bend[bent_face == f]
+            for row, length, turn in (curves[c] for c in around):
+                within = np.sqrt(np.maximum(turn**2 - with_face[row] ** 2, 0.0))
+                off -= np.sum(length**2 / fine[chord[row]] ** 2 * (turn - within) / 12)
+        if off > LOST * face_area[f]:
             limit[around] = STEEP_ROUND
     steep = np.zeros(len(edges), bool)
     for row, turn, most in zip(rows, turns, limit):
         steep[row] = turn > most
+    if surfaces.curved.any():
+        bend /= fine[chord[bent]]
+        key = bent_face * len(edges) + bent
+        q = np.flatnonzero(surfaces.curved[guide.quad_face])
+        side = bend[np.searchsorted(key, guide.quad_face[q, None] * len(edges) + quad_edges[q])]
+        share = (np.maximum(side[:, :2], side[:, 2:]) ** 2).sum(axis=1) / 24
+        flattened: Float = np.bincount(guide.quad_face[q], areas[q] * share, minlength=len(face_area)).astype(np.float64)
+        strict = _too_flat(model, face_area, flattened)
+        steep[bent[bend > np.where(strict[bent_face], STEEP_ROUND, STEEP)]] = True
     return np.unique(chord[steep])
+
+
+def _too_flat(model: Model, area: Float, lost: Float) -> Bool:
+    """(f,) Faces that lose more than `LOST` of their `area` (f,), where the model or a physical surface with them does so."""
+    out = np.zeros(len(area), bool)
+    named: dict[str, list[int]] = {}
+    for f, names in enumerate(model.face_names):
+        for name in names:
+            named.setdefault(name, []).append(f)
+    for faces in (list(range(len(area))), *named.values()):
+        if lost[faces].sum() > LOST * area[faces].sum():
+            out[faces] = True
+    return out & (lost > LOST * area)
 
 
 def graded(model: Model, guide: Guide, fine: Int) -> Int:

@@ -4,6 +4,9 @@ Curves first (exact CAD points, monotone spacing), then the inner guide edges (H
 cubic that bulges too much folds the cells beside it, and sides of a thin cell that grow differently shear it: where a fine
 quad is worse than half its guide quad, the edges of that cell are made straight and even step by step (on CAD curves, even
 only).  Only cells that touch a changed edge are computed again.
+
+On a curved face what cubics and Coons' rule give is put on the surface: the nodes inside guide edges first, those inside cells,
+which lie between them, afterwards.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import numpy as np
 
 from ..errors import InputError, MeshError
 from ..records import Bool, Float, Guide, Int, Model, QuadMesh
+from ..surfaces import Surfaces
 from .cells import Cells
 from .curves import curve_parameters
 from .numbering import guide_chords, guide_topology, number
@@ -34,6 +38,7 @@ POOR = 0.05  # guide quads below this are held to this
 
 def fill(
     model: Model,
+    surfaces: Surfaces,
     guide: Guide,
     divisions: Int,
     evaluate: Callable[[int, Float], Float],
@@ -46,6 +51,8 @@ def fill(
     Parameters
     ----------
     model : Model
+    surfaces : Surfaces
+        The faces of `model`.
     guide : Guide
     divisions : (c,) int64
         Pieces of the edges of every guide chord (`guide_chords`), at least 1.
@@ -54,7 +61,8 @@ def fill(
     vertices : (v, 3) float64, optional
         Exact CAD vertices in the user's coordinates; by default those of `model`.
     filler : {"numpy", "gmsh"}
-        Who fills the cells.  Both follow the same rule; Gmsh's transfinite mesher takes longer.
+        Who fills the cells.  Both follow the same rule; Gmsh's transfinite mesher takes longer, and fills
+        plane faces only.
 
     Returns
     -------
@@ -65,10 +73,14 @@ def fill(
     ------
     MeshError
         A guide quad that is not inverted cannot be filled without inverted quads, or the guide is not conforming.
+    InputError
+        An unknown filler, or Gmsh for curved faces.
     """
     if filler not in ("numpy", "gmsh"):
         raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
-    work = _Work.start(model, guide, divisions, evaluate, vertices)
+    if filler == "gmsh" and surfaces.curved.any():
+        raise InputError("Gmsh's filler cannot fill curved faces", remedy='use "numpy"')
+    work = _Work.start(model, surfaces, guide, divisions, evaluate, vertices)
     cells, points = work.cells, work.points
     own = cells.corner_quality()
     _refuse_folds(model, guide, own, work.place(own))
@@ -82,13 +94,18 @@ def fill(
 
 
 def poor_cells(
-    model: Model, guide: Guide, divisions: Int, evaluate: Callable[[int, Float], Float], vertices: Float | None = None
+    model: Model,
+    surfaces: Surfaces,
+    guide: Guide,
+    divisions: Int,
+    evaluate: Callable[[int, Float], Float],
+    vertices: Float | None = None,
 ) -> tuple[Int, Int]:
     """Guide quads that come out of `fill` worse than they should: divide their chords and smooth the guide again.
 
     Parameters
     ----------
-    model, guide, divisions, evaluate, vertices
+    model, surfaces, guide, divisions, evaluate, vertices
         As for `fill`; of more than `SHOWN` divisions the cells are judged at that many, and of one at two, so that an edge
         that cuts across a curve is seen; prescribed nodes are kept.
 
@@ -108,7 +125,7 @@ def poor_cells(
             along = np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:])
             own_chords = chord[np.searchsorted(edges[:, 0] * n + edges[:, 1], along)]
             shown[own_chords] = divisions[own_chords]
-    work = _Work.start(model, guide, shown, evaluate, vertices)
+    work = _Work.start(model, surfaces, guide, shown, evaluate, vertices)
     own = work.cells.corner_quality()
     quality = work.place(own)
     return np.flatnonzero(quality < KEEP * np.maximum(own, POOR)), np.flatnonzero(quality <= 0)
@@ -128,6 +145,7 @@ class _Work:
     def start(
         cls,
         model: Model,
+        surfaces: Surfaces,
         guide: Guide,
         divisions: Int,
         evaluate: Callable[[int, Float], Float],
@@ -144,7 +162,9 @@ class _Work:
         used = numbering.vertex_node >= 0
         exact = model.vertices * model.scale + model.origin if vertices is None else vertices
         points[numbering.vertex_node[used]] = exact[used]
-        cells = Cells(guide, topology, numbering, Skeleton.start(guide, pieces), Frames.of(model))
+        skeleton = Skeleton.start(guide, pieces)
+        skeleton.put_vertices(guide, topology, surfaces)
+        cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces)
         work = cls(model, cells, evaluate, points, [np.empty(0)] * len(guide.chains))
         for row in range(len(guide.chains)):
             work.put_curve(row, np.zeros(len(edges)))
@@ -168,7 +188,8 @@ class _Work:
         cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
         edges, quad_edges = topology.edges, topology.quad_edges
         tangents = end_tangents(skeleton.vertices, edges, skeleton.divisions, continuation(cells.guide.quads, topology))
-        skeleton.put_cubics(np.flatnonzero(~topology.on_curve), edges, tangents)
+        on_surfaces = cells.frames.curved, cells.surfaces
+        skeleton.put_cubics(np.flatnonzero(~topology.on_curve), topology, tangents, *on_surfaces)
         worst = cells.place(np.arange(len(quad_edges)), self.points)
         even = np.zeros(len(edges))
         for share in SHARES:
@@ -187,7 +208,7 @@ class _Work:
             e = np.flatnonzero(soft & ~topology.on_curve)
             chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
             tangents[e] += share * (chord[:, None] - tangents[e])
-            skeleton.put_cubics(e, edges, tangents)
+            skeleton.put_cubics(e, topology, tangents, *on_surfaces)
             again = np.flatnonzero(np.any(soft[quad_edges], axis=1))
             worst[again] = cells.place(again, self.points)
         skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..records import Bool, Float, Guide, Int, Model
+from ..surfaces import Surfaces
 from .numbering import GuideTopology, Numbering
 from .tangents import cubic
 
@@ -20,21 +21,36 @@ class Frames:
     Attributes
     ----------
     origin : (f, 3) float64, scaled; axes : (f, 2, 3) float64
+        NaN for curved faces.
     user_origin : (f, 3) float64; user_axes : (f, 2, 3) float64
         Scaled local coordinates to the user's: ``user_origin + x user_axes[0] + y user_axes[1]``.
+    curved : (f,) bool
+    scale : float; shift : (3,) float64
+        Scaled coordinates to the user's.
     """
 
     origin: Float
     axes: Float
     user_origin: Float
     user_axes: Float
+    curved: Bool
+    scale: float
+    shift: Float
 
     @classmethod
     def of(cls, model: Model) -> Frames:
         """Frames of the faces of `model`."""
+        none = np.full((2, 3), np.nan)
         origin = np.array([f.origin for f in model.faces], float).reshape(-1, 3)
-        axes = np.array([f.axes for f in model.faces], float).reshape(-1, 2, 3)
-        return cls(origin, axes, origin * model.scale + model.origin, axes * model.scale)
+        axes = np.array([none if f.curved else f.axes for f in model.faces], float).reshape(-1, 2, 3)
+        curved = np.array([f.curved for f in model.faces], bool)
+        user = origin * model.scale + model.origin, axes * model.scale
+        return cls(origin, axes, *user, curved, model.scale, model.origin)
+
+    def user_of_scaled(self, points: Float) -> Float:
+        """Points (..., 3) in the user's coordinates of scaled ones."""
+        out: Float = points * self.scale + self.shift
+        return out
 
     def local(self, points: Float, face: Int) -> Float:
         """Local coordinates (2, m, ...) of scaled points (m, ..., 3), each m in the plane of its face (m,)."""
@@ -52,6 +68,14 @@ class Frames:
             np.multiply(local[0], axes[:, 0, c][one], out=out[..., c])
             out[..., c] += local[1] * axes[:, 1, c][one]
             out[..., c] += origin[:, c][one]
+        return out
+
+    def on_face(self, points: Float, face: Int) -> Float:
+        """Scaled points (m, 3) in the user's coordinates; those of plane faces in their planes."""
+        out = self.user(self.local(points, face), face)
+        curved = self.curved[face]
+        if curved.any():
+            out[curved] = self.user_of_scaled(points[curved])
         return out
 
 
@@ -94,6 +118,13 @@ class Skeleton:
         np.maximum.at(bulge, owner, np.linalg.norm(off - along[:, None] * chord[owner], axis=1))
         return bulge, length
 
+    def put_vertices(self, guide: Guide, topology: GuideTopology, surfaces: Surfaces) -> None:
+        """Put the guide vertices inside curved faces on these."""
+        v = np.flatnonzero((topology.vertex_face >= 0) & (guide.cad_vertex < 0))
+        v = v[surfaces.curved[topology.vertex_face[v]]]
+        if len(v):
+            self.vertices[v] = surfaces.feet(topology.vertex_face[v], self.vertices[v])
+
     def put_chain(self, chain: Int, edges: Int, forward: Bool, nodes: Float) -> None:
         """Put the `nodes` of a whole CAD curve on its guide vertices `chain` and its `edges`."""
         place = np.concatenate([[0], np.cumsum(self.divisions[edges])])
@@ -103,24 +134,28 @@ class Skeleton:
         row = self.first[edges][owner] + np.where(forward[owner], j, self.divisions[edges][owner] - 2 - j)
         self.inside[row] = nodes[place[owner] + 1 + j]
 
-    def put_cubics(self, which: Int, edges: Int, tangents: Float) -> None:
-        """Put cubics with the given end `tangents` (e, 2, 3) on the edges `which`."""
+    def put_cubics(self, which: Int, topology: GuideTopology, tangents: Float, curved: Bool, surfaces: Surfaces) -> None:
+        """Put cubics with the given end `tangents` (e, 2, 3) on the edges `which`, and those in `curved` (f,) faces on these."""
+        edges = topology.edges
         for count in np.unique(self.divisions[which]).tolist():
             e = which[self.divisions[which] == count]
             rows = self.rows(e, np.zeros(len(e), bool), count)
             self.inside[rows] = cubic(self.vertices[edges[e, 0]], self.vertices[edges[e, 1]], tangents[e], count)
+        bent = which[curved[topology.edge_face[which]]]
+        if len(bent):
+            owner, j = _ragged(self.divisions[bent] - 1)
+            rows, face = self.first[bent[owner]] + j, topology.edge_face[bent[owner]]
+            self.inside[rows] = surfaces.feet(face, self.inside[rows])
 
     def write(self, points: Float, guide: Guide, numbering: Numbering, topology: GuideTopology, frames: Frames) -> None:
-        """Write what is inside faces to `points`, in the user's coordinates; it lies in its plane."""
+        """Write what is inside faces to `points`, in the user's coordinates; in plane faces it lies in their planes."""
         v = np.flatnonzero((topology.vertex_face >= 0) & (guide.cad_vertex < 0))
-        face = topology.vertex_face[v]
-        points[numbering.vertex_id[v]] = frames.user(frames.local(self.vertices[v], face), face)
+        points[numbering.vertex_id[v]] = frames.on_face(self.vertices[v], topology.vertex_face[v])
         e = np.flatnonzero(~topology.on_curve)
         owner, j = _ragged(self.divisions[e] - 1)
         e = e[owner]
-        face = topology.edge_face[e]
-        local = frames.local(self.inside[self.first[e] + j], face)
-        points[numbering.edge_first[e] + numbering.edge_step[e] * j] = frames.user(local, face)
+        on_face = frames.on_face(self.inside[self.first[e] + j], topology.edge_face[e])
+        points[numbering.edge_first[e] + numbering.edge_step[e] * j] = on_face
 
 
 def _ragged(count: Int) -> tuple[Int, Int]:
