@@ -323,4 +323,5 @@ def test_the_middle_of_a_side_is_in_its_bend() -> None:
     bent = np.stack([np.sin(t), 1 - np.cos(t), 0 * t], axis=1)
     line = np.concatenate([[[-8.0, 0, 0]], bent])
     assert bends.middle(line) > 8.0
+    assert np.isclose(bends.middle(np.array([[0.0, 0, 0], [1, 0, 0], [4, 0, 0]])), 2.0)
     assert np.isclose(bends.middle(bent), 0.5 * np.linalg.norm(np.diff(bent, axis=0), axis=1).sum(), rtol=1e-6)

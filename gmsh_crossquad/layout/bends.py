@@ -80,7 +80,7 @@ def middle(side: Float) -> float:
     share = np.concatenate([[0.0], turning(samples), [0.0]])
     weight = 0.5 * (share[1:] + share[:-1])
     total = weight.sum()
-    weight = (0.8 * weight / total if total > 0.0 else 0.0) + 0.2 / CHORDS
+    weight = weight * (0.8 / total if total > 0.0 else 0.0) + 0.2 / CHORDS
     length = float(np.linalg.norm(np.diff(side, axis=0), axis=1).sum())
     grown = np.concatenate([[0.0], np.cumsum(weight)])
     return float(np.interp(0.5 * grown[-1], grown, np.linspace(0.0, length, CHORDS + 1)))
