@@ -19,7 +19,7 @@ from .layout.quantize import quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
-from .surfaces import Planes
+from .surfaces import Surfaces
 from .watch import Watch
 
 __all__ = ["GuideResult", "TooManyCells", "coarse_divisions", "smooth_guide"]
@@ -74,6 +74,7 @@ def coarse_divisions(model: Model, tmesh: TMesh, block: Float) -> Int:
 
 def smooth_guide(
     model: Model,
+    surfaces: Surfaces,
     tmesh: TMesh,
     coarse: Int,
     size: Float,
@@ -102,7 +103,6 @@ def smooth_guide(
     """
     with watch.stage("guide"):
         chords = find_chords(tmesh, quotient(tmesh, coarse))
-    surfaces = Planes(model)
     notes: list[str] = []
     finer: Int | None = None
     best: tuple[tuple[int, int, float], Guide, Int] | None = None
@@ -132,8 +132,8 @@ def smooth_guide(
         steep = np.zeros(0, np.int64)
         if not len(bad):
             with watch.stage("fill"):
-                bad, folded = poor_cells(model, guide, fine, evaluate, vertices)
-                steep = steep_chords(model, guide, fine)
+                bad, folded = poor_cells(model, surfaces, guide, fine, evaluate, vertices)
+                steep = steep_chords(model, surfaces, guide, fine)
         score = (-len(folded), -len(steep), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
@@ -147,7 +147,7 @@ def smooth_guide(
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, guide, bad), steep)])] *= 2
+        finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, surfaces, guide, bad), steep)])] *= 2
     assert best is not None
     (folds, _, quality), guide, fine = best
     if folds:
@@ -157,7 +157,7 @@ def smooth_guide(
         )
     with watch.stage("fill"):
         halved = graded(model, guide, fine)
-        if (halved != fine).any() and not len(poor_cells(model, guide, halved, evaluate, vertices)[1]):
+        if (halved != fine).any() and not len(poor_cells(model, surfaces, guide, halved, evaluate, vertices)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))

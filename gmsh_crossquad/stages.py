@@ -17,8 +17,10 @@ from .cad.background import background_meshes
 from .cad.put import curve_points, vertex_points
 from .cad.read import read_model
 from .cad.sizes import target_sizes
+from .cad.surfaces import CadSurfaces
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
+from .field.surface_mesh import SurfaceMesh
 from .field_stage import Rule, Wishes, changes_of, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
@@ -188,6 +190,7 @@ def _mesh(
 ) -> tuple[TMesh, Int, GuideResult, QuadMesh] | None:
     """Layout, guide grid and final mesh from the faces' T-meshes; None if `seen` has the same layout."""
     which = attempt.background, attempt.rule, attempt.pinned, attempt.capped
+    surfaces = CadSurfaces(model, faces.meshes)
     with watch.stage("sizes"):
         sizes = target_sizes(model, faces.meshes, options)
     with watch.stage("glue"):
@@ -206,9 +209,9 @@ def _mesh(
         if _known((*which, "divisions", coarse.tobytes()), seen):
             return None
     evaluate, vertices = _evaluator(model), vertex_points(model)
-    result = smooth_guide(model, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
+    result = smooth_guide(model, surfaces, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
     with watch.stage("fill"):
-        mesh = fill(model, result.guide, result.fine, evaluate, vertices)
+        mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
     return tmesh, coarse, result, mesh
 
 
@@ -224,9 +227,7 @@ def _evaluator(model: Model) -> Callable[[int, Float], Float]:
 
 
 def _area(mesh: FaceMesh) -> float:
-    a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
-    u, v = b - a, c - a
-    return 0.5 * float(np.sum(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+    return float(SurfaceMesh(mesh.points, mesh.triangles).area.sum())
 
 
 def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:

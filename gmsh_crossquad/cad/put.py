@@ -55,7 +55,7 @@ def vertex_points(model: Model) -> Float:
     """Exact places (v, 3) of the CAD vertices of the current Gmsh model, in the user's coordinates."""
     out: Float = model.vertices * model.scale + model.origin
     for row, tag in enumerate(model.vertex_tags.tolist()):
-        if tag > 0 and not gmsh.model.getType(0, tag).startswith("Discrete"):
+        if tag >= 0 and not gmsh.model.getType(0, tag).startswith("Discrete"):
             with gmsh_errors("evaluating", entity=(0, tag)):
                 out[row] = gmsh.model.getValue(0, tag, [])
     return out
@@ -87,7 +87,7 @@ def put_mesh(model: Model, mesh: QuadMesh) -> None:
         for tag, node in zip(model.vertex_tags.tolist(), mesh.vertex_node.tolist()):
             if node < 0:
                 continue
-            if tag <= 0:
+            if tag < 0:
                 free_vertices[node] = True
                 continue
             element += _put_point(tag, node + 1, mesh.points[node], element)
