@@ -137,9 +137,7 @@ def test_surfaces_of_revolution_get_their_circles_and_meridians(mesh):
     middle = mesh.points[mesh.edges].mean(axis=1)
     around = np.stack([-middle[:, 1], middle[:, 0], 0 * middle[:, 0]], axis=1)
     x = mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]
-    normal = mesh.triangle_normal[mesh.edge_half_edges // 3]
-    normal[mesh.edge_half_edges[:, 1] < 0, 1] = 0
-    y = np.cross(normal.sum(axis=1), x)
+    y = np.cross(mesh.edge_normal, x)
     unit = [v / np.linalg.norm(v, axis=1)[:, None] for v in (x, y)]
     exact = np.arctan2(*(np.sum(around * v, axis=1) for v in unit[::-1]))
     assert np.abs(wrap(field.theta - exact)).max() < 0.1
@@ -446,3 +444,20 @@ def test_what_is_no_surface_is_refused(triangles, match):
 def test_a_core_size_on_curved_surfaces(mesh, expected):
     index = aligned_field(face_mesh(mesh), epsilon=0.15).index
     assert index[index != 0].tolist() == [1] * expected
+
+
+def test_normals_of_a_sphere():
+    mesh = moved(sphere(6))
+    centre = np.array([0.3, -2.0, 1.1])
+    for normal, place in (
+        (mesh.triangle_normal, mesh.points[mesh.triangles].mean(axis=1)),
+        (mesh.edge_normal, mesh.points[mesh.edges].mean(axis=1)),
+        (mesh.vertex_normal, mesh.points),
+    ):
+        exact = (place - centre) / np.linalg.norm(place - centre, axis=1)[:, None]
+        assert np.abs(np.linalg.norm(normal, axis=1) - 1).max() < 1e-12
+        assert np.linalg.norm(normal - exact, axis=1).max() < 0.05
+    flat = disc(3, 8)
+    assert flat.triangle_normal is None
+    assert flat.edge_normal is None
+    assert flat.vertex_normal is None

@@ -123,11 +123,10 @@ def _start(mesh: SurfaceMesh, along: ConnectionOperators, frame: Float, mass: Fl
 
 
 def _axes(mesh: SurfaceMesh) -> Float:
-    """(e, 2) sum of the fourth powers of the axes' projections, in the frame of every edge that is not on the boundary."""
-    assert mesh.triangle_normal is not None
+    """(e, 2) sum of the fourth powers of the axes' projections, in the frame of every edge."""
+    assert mesh.edge_normal is not None
     x = (mesh.points[mesh.edges[:, 1]] - mesh.points[mesh.edges[:, 0]]) / mesh.edge_length[:, None]
-    normal = mesh.triangle_normal[mesh.edge_half_edges // 3].sum(axis=1)
-    y = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], x)
+    y = np.cross(mesh.edge_normal, x)
     z = ((x + 1j * y) ** 4).sum(axis=1)
     return np.stack([z.real, z.imag], axis=1)
 

@@ -145,6 +145,15 @@ class SurfaceMesh:
         return normal / np.linalg.norm(normal, axis=1)[:, None]
 
     @cached_property
+    def edge_normal(self) -> Float | None:
+        """(e, 3) unit normals half-way between those of the triangles at every edge; None in the plane."""
+        if self.triangle_normal is None:
+            return None
+        first, second = self.edge_half_edges.T // 3
+        normal = self.triangle_normal[first] + np.where(second < 0, 0.0, 1.0)[:, None] * self.triangle_normal[second]
+        return normal / np.linalg.norm(normal, axis=1)[:, None]
+
+    @cached_property
     def half_edge_direction(self) -> Float:
         """(m, 3) angle of every half-edge in its triangle's layout."""
         a = self.corner_angle
