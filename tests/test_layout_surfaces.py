@@ -144,7 +144,7 @@ def test_no_patch_wraps_around_in_both_directions(name: str) -> None:
     tmesh = traced(name)[3]
     for patch in tmesh.patches:
         lines = [np.concatenate([tmesh.polyline[arc][::way] for arc, way in side]) for side in patch]
-        turn = [bends.turning(bends.resampled(line)).sum() for line in lines]
+        turn = [bends.turning(*bends.resampled([line], np.array([12]))).sum() for line in lines]
         both = sorted([0.5 * (turn[0] + turn[2]), 0.5 * (turn[1] + turn[3])])
         assert both[0] < bends.CROSS_TURN or both[1] < bends.LONG_TURN
 

@@ -20,13 +20,14 @@ MOST_CHORDS = 24
 def arc_bends(model: Model, tmesh: TMesh) -> dict[int, Float]:
     """Total turning (k,), in radians, from the start of an arc to places at even arc lengths; for arcs inside curved faces."""
     curved = [p for p, f in zip(tmesh.patches, tmesh.patch_face.tolist()) if model.faces[f].curved]
-    arcs = {arc for patch in curved for side in patch for arc, _ in side if tmesh.arc_curve[arc] < 0}
-    return {arc: _cumulative(tmesh.polyline[arc]) for arc in sorted(arcs)}
-
-
-def _cumulative(line: Float) -> Float:
-    """Total turning up to the ends of a few chords; the first and the last chord turn like their neighbours."""
-    angle = turning(resampled(line, min(max(len(line) // CROSSINGS, 2), MOST_CHORDS)))
-    padded = np.concatenate([angle[:1], angle, angle[-1:]])
-    out: Float = np.concatenate([[0.0], np.cumsum(0.5 * (padded[1:] + padded[:-1]))])
-    return out
+    arcs = sorted({arc for patch in curved for side in patch for arc, _ in side if tmesh.arc_curve[arc] < 0})
+    if not arcs:
+        return {}
+    lines = [tmesh.polyline[arc] for arc in arcs]
+    chords = np.clip(np.array([len(line) for line in lines]) // CROSSINGS, 2, MOST_CHORDS)
+    samples, first = resampled(lines, chords)
+    angle = turning(samples, first)
+    start, end = first[:-1], first[1:] - 1
+    angle[start], angle[end] = angle[start + 1], angle[end - 1]  # the first and the last chord turn like their neighbours
+    grown = np.concatenate([[0.0], np.cumsum(0.5 * (angle[1:] + angle[:-1]))])
+    return {arc: grown[a:b] - grown[a] for arc, a, b in zip(arcs, first[:-1].tolist(), first[1:].tolist())}

@@ -10,13 +10,13 @@ not count.  A patch whose normals hardly differ is as good as plane, whatever it
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..records import Float
+from ..records import Float, Int
 
-__all__ = ["bend", "middle", "resampled", "turning", "vertex_normals"]
+__all__ = ["bent_patches", "lengths", "middle", "resampled", "turning", "vertex_normals"]
 
 LONG_TURN = np.radians(120.0)
 CROSS_TURN = np.radians(50.0)
@@ -24,7 +24,7 @@ SPREAD = np.radians(60.0)
 CHORDS = 12
 
 
-def vertex_normals(points: Float, triangles: np.ndarray) -> Float:
+def vertex_normals(points: Float, triangles: Int) -> Float:
     """(n, 3) unit normals at the vertices of a triangulated surface, weighted by area."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     area = np.repeat(np.cross(b - a, c - a), 3, axis=0)
@@ -34,53 +34,68 @@ def vertex_normals(points: Float, triangles: np.ndarray) -> Float:
     return unit
 
 
-def resampled(line: Float, chords: int = CHORDS) -> Float:
-    """Points (chords + 1, d) at even arc lengths of a polyline."""
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    t = np.linspace(0.0, s[-1], chords + 1)
-    return np.stack([np.interp(t, s, line[:, k]) for k in range(line.shape[1])], axis=1)
+def resampled(lines: Sequence[Float], chords: Int) -> tuple[Float, Int]:
+    """Every polyline (k, 3) at `chords` + 1 (l,) places of even arc lengths: all points, each first row and the end."""
+    count = np.array([len(line) for line in lines], np.int64)
+    points = np.concatenate(lines)
+    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    ends = np.cumsum(count)
+    step[ends[:-1] - 1] = 1.0  # sets the lines apart
+    s = np.concatenate([[0.0], np.cumsum(step)])
+    low, length = s[ends - count], s[ends - 1] - s[ends - count]
+    first = np.concatenate([[0], np.cumsum(chords + 1)])
+    row = np.repeat(np.arange(len(lines)), chords + 1)
+    t = (np.arange(first[-1]) - first[row]) / chords[row]
+    at = low[row] + t * length[row]
+    return np.stack([np.interp(at, s, points[:, k]) for k in range(points.shape[1])], axis=1), first
 
 
-def turning(samples: Float) -> Float:
-    """(k - 1,) angles between consecutive chords of a polyline of k + 1 points; 0 beside chords of no length."""
+def turning(samples: Float, first: Int) -> Float:
+    """(n,) angle between the chords at the inner points of polylines of more than one chord; the first and the last have none."""
     d = np.diff(samples, axis=0)
     length = np.linalg.norm(d, axis=1)
     d = d / np.where(length > 0.0, length, 1.0)[:, None]
     angle = 2.0 * np.arctan2(np.linalg.norm(d[1:] - d[:-1], axis=1), np.linalg.norm(d[1:] + d[:-1], axis=1))
-    out: Float = np.where((length[1:] > 0.0) & (length[:-1] > 0.0), angle, 0.0)
+    out = np.zeros(len(samples))
+    out[1:-1] = np.where((length[1:] > 0.0) & (length[:-1] > 0.0), angle, 0.0)
+    out[first[:-1]] = out[first[1:] - 1] = 0.0
     return out
 
 
-def bend(sides: list[Float], normals: Callable[[Float], Float]) -> list[int]:
-    """Sides from which a patch should be cut, the better one first; none if it need not.
+def lengths(lines: Sequence[Float]) -> Float:
+    """(l,) lengths of polylines."""
+    return np.array([float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines])
+
+
+def bent_patches(sides: Sequence[Float], normals: Callable[[Float], Float]) -> dict[int, list[int]]:
+    """Patches that should be divided, and from which of their sides, the better one first.
 
     Parameters
     ----------
-    sides : four (k, 3) float64
-        Polylines counter-clockwise around the patch.
+    sides : (k, 3) float64 each
+        Four polylines per patch, counter-clockwise around it.
     normals : callable
         Unit normals (n, 3) of the surface near points (n, 3).
     """
-    samples = [resampled(side) for side in sides]
-    total = [float(turning(p).sum()) * CHORDS / (CHORDS - 1) for p in samples]
-    turn = [0.5 * (total[0] + total[2]), 0.5 * (total[1] + total[3])]
-    long = int(turn[1] > turn[0])
-    if turn[long] < LONG_TURN or turn[1 - long] < CROSS_TURN:
-        return []
-    n = normals(np.concatenate(samples))
-    if float((n @ n.T).min()) > np.cos(SPREAD):
-        return []
-    length = [float(np.linalg.norm(np.diff(side, axis=0), axis=1).sum()) for side in sides]
-    return [long, long + 2] if length[long] >= length[long + 2] else [long + 2, long]
+    samples, first = resampled(sides, np.full(len(sides), CHORDS))
+    total = np.add.reduceat(turning(samples, first), first[:-1]).reshape(-1, 4) * (CHORDS / (CHORDS - 1))
+    turn = 0.5 * (total[:, :2] + total[:, 2:])
+    out: dict[int, list[int]] = {}
+    for p in np.flatnonzero((turn.max(axis=1) >= LONG_TURN) & (turn.min(axis=1) >= CROSS_TURN)).tolist():
+        n = normals(samples[first[4 * p] : first[4 * p + 4]])
+        if float((n @ n.T).min()) > np.cos(SPREAD):
+            continue
+        long = int(turn[p, 1] > turn[p, 0])
+        one, two = lengths([sides[4 * p + long], sides[4 * p + long + 2]]).tolist()
+        out[p] = [long, long + 2] if one >= two else [long + 2, long]
+    return out
 
 
 def middle(side: Float) -> float:
     """Arc length at which a side has half of its turning (a fifth of it counted by length)."""
-    samples = resampled(side)
-    share = np.concatenate([[0.0], turning(samples), [0.0]])
+    share = turning(*resampled([side], np.array([CHORDS])))
     weight = 0.5 * (share[1:] + share[:-1])
     total = weight.sum()
     weight = weight * (0.8 / total if total > 0.0 else 0.0) + 0.2 / CHORDS
-    length = float(np.linalg.norm(np.diff(side, axis=0), axis=1).sum())
     grown = np.concatenate([[0.0], np.cumsum(weight)])
-    return float(np.interp(0.5 * grown[-1], grown, np.linspace(0.0, length, CHORDS + 1)))
+    return float(np.interp(0.5 * grown[-1], grown, np.linspace(0.0, float(lengths([side])[0]), CHORDS + 1)))

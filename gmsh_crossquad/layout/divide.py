@@ -14,7 +14,7 @@ import numpy as np
 from ..records import FaceMesh, FaceTMesh, Float
 from ..spatial import cKDTree
 from .assemble import Source
-from .bends import bend, middle, vertex_normals
+from .bends import bent_patches, middle, vertex_normals
 from .branches import branch, branch_inwards
 from .crossing import ONE
 from .step import CLEAR
@@ -57,11 +57,13 @@ class Divider:
         """
         before = self.count
         busy: set[int] = set()
-        for patch in tmesh.patches:
-            lines = [np.concatenate([_run(tmesh, half)[:-1] for half in side] + [_run(tmesh, side[-1])[-1:]]) for side in patch]
+        sides = [side for patch in tmesh.patches for side in patch]
+        lines = [np.concatenate([_run(tmesh, half)[k > 0 :] for k, half in enumerate(side)]) for side in sides]
+        for p, order in bent_patches(lines, self._normals).items():
+            patch = tmesh.patches[p]
             arcs = {arc for side in patch for arc, _ in side}
-            for i in bend(lines, self._normals):
-                if self.count < MOST_BRANCHES and not arcs & busy and self._cut_side(tmesh, sources, patch[i], lines[i]):
+            for i in order:
+                if self.count < MOST_BRANCHES and not arcs & busy and self._cut_side(tmesh, sources, patch[i], lines[4 * p + i]):
                     self.count += 1
                     busy |= arcs
                     break
