@@ -10,7 +10,8 @@ import pytest
 
 from gmsh_crossquad.errors import InputError, MeshError
 from gmsh_crossquad.fill.coons import surface_quality
-from gmsh_crossquad.fill.curve_edges import chords_to_divide, steep_chords
+from gmsh_crossquad.fill.curve_edges import chords_to_divide, graded, steep_chords
+from gmsh_crossquad.fill.curve_fit import curve_fit
 from gmsh_crossquad.fill.numbering import guide_chords
 from gmsh_crossquad.fill.pipeline import fill, poor_cells
 from gmsh_crossquad.quality import twins
@@ -314,6 +315,13 @@ def test_divisions_must_fit() -> None:
     model, surface, guide = ball(1)
     with pytest.raises(MeshError, match="divisions"):
         fill(model, surface, guide, np.ones(2, int), no_curve)
+
+
+def test_without_curves_no_edge_is_badly_graded() -> None:
+    model, surface, guide = ball(2)
+    fine = uniform(guide, 3)
+    assert (graded(model, guide, fine) == fine).all()
+    assert curve_fit(fill(model, surface, guide, fine, no_curve)) == 0.0
 
 
 @pytest.mark.parametrize(("pieces", "steep"), [(1, True), (2, True), (3, True), (4, False)])

@@ -144,6 +144,8 @@ def graded(model: Model, guide: Guide, fine: Int) -> Int:
     """Final edges per guide edge of every guide chord, doubled where edges on curves are much longer than those beside them."""
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
     curves = _curve_edges(model, guide, edges)
+    if not curves:
+        return fine
     prescribed = np.zeros(len(fine), bool)
     for curve, (row, _, _) in zip(model.curves, curves):
         if curve.spacing is not None:

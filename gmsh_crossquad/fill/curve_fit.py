@@ -19,6 +19,8 @@ SAMPLES = np.array([0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.88, 0
 
 def curve_fit(mesh: QuadMesh) -> float:
     """Greatest distance of a point on a curve edge from its neighbouring edges, in lengths of the nearest; 0 is perfect."""
+    if not mesh.curve_nodes:
+        return 0.0
     edges: Int = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes])
     return float(misfits(mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]).max(initial=0.0))
 
