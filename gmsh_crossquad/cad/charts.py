@@ -2,8 +2,9 @@
 
 Parameters are used in units of the face's own range: u and v are 0 and 1 on its bounds.  Gmsh evaluates a point in .1 to 2
 microseconds, and most surfaces also outside their bounds.  Parameters are kept within them where that means nothing (B-splines
-run away there within a tenth of their range, a cone has a second half behind its apex); they run freely round a cylinder,
-sphere, torus or a surface of revolution, and round any face that closes: from one seam to the other.
+run away there within a tenth of their range, a cone has a second half behind its apex).  They run freely on a cylinder, a
+sphere, a torus and a cone whose apex is far, round a surface of revolution, and round any face that closes: from one seam to
+the other.
 
 Two traps of Gmsh 4.15.2: derivatives of surfaces of the built-in kernel are difference quotients (good to about 1e-7), their
 second derivatives quotients of these that are noise; so second derivatives are taken over a step of a thousandth here.
@@ -75,6 +76,10 @@ class Charts:
             out.low[row], out.width[row] = low, high - low
             out.sphere[row] = kind == "Sphere"
             free = FREE.get(kind, (False, False))
+            if kind == "Cone":  # free where the apex is more than half of the range away
+                ring = out.derivatives(np.full(2, row), np.array([[0.5, 0.0], [0.5, 1.0]]))[:, 0]
+                radius = np.linalg.norm(ring, axis=1)
+                free = True, bool(3 * radius.min() > radius.max())
             for k in range(2):
                 ends = np.empty((2, len(PROBES), 2))
                 ends[..., k], ends[..., 1 - k] = np.array([[0.0], [1.0]]), PROBES
@@ -112,7 +117,10 @@ class Charts:
             move = np.zeros(2)
             move[k] = STEP
             # one-sided at bounds
-            a, b = (np.where(self.clamped[face], np.clip(uv + s * move, 0.0, 1.0), uv + s * move) for s in (-1.0, 1.0))
+            a, b = uv - move, uv + move
+            ends = self.clamped[face]
+            a = np.where(ends, np.minimum(np.maximum(a, 0.0), 1.0 - move), a)
+            b = np.where(ends, np.maximum(np.minimum(b, 1.0), move), b)
             quotient = (self.derivatives(face, b) - self.derivatives(face, a)) / (b - a)[:, k, None, None]
             out[:, 2 * k] = quotient[:, k]
             mixed.append(quotient[:, 1 - k])

@@ -1,7 +1,7 @@
 """Samples of curved CAD faces: where the search for nearest points starts, and normals near points.
 
-They are the points of the background mesh that have CAD parameters.  Triangles over which the normal turns by more than .25 get
-more samples inside, at the middles of the equal parts into which they are cut, about one for each quarter of a radian.  Each has
+They are the points of the background mesh that have CAD parameters.  Triangles over which the normal turns by more than .3 get
+more samples inside, at the middles of the equal parts into which they are cut, about one for each .3 of a radian.  Each has
 the CAD's normal and its derivative, so the normal near it is known to second order.
 """
 
@@ -22,8 +22,8 @@ from .feet import Start, newton
 __all__ = ["SurfaceSamples", "surface_samples"]
 
 POLE = 1e-6  # of the usual |S_u x S_v|
-FINE = 0.25  # radians
-MOST_PARTS = 8
+FINE = 0.3  # radians
+MOST_PARTS = 6
 TURN = 0.5  # radians, greatest turn of a sample's normal
 
 
@@ -117,7 +117,8 @@ def surface_samples(model: Model, meshes: tuple[FaceMesh, ...], charts: Charts) 
     keep = [np.flatnonzero(np.isfinite(m.parameters).all(axis=1)) for m in meshes]
     face = np.concatenate([np.full(len(k), m.face) for m, k in zip(meshes, keep)])
     own = np.concatenate([m.parameters[k] for m, k in zip(meshes, keep)])
-    uv = charts.from_user(face, own)
+    own = charts.from_user(face, own)
+    uv, _ = charts.moved(face, own, np.zeros_like(own))  # some of Gmsh's are a little out of bounds
     start = _evaluated(charts, face, uv)
     normal = np.cross(start.first[:, 0], start.first[:, 1])
     length = np.linalg.norm(normal, axis=1)
