@@ -4,11 +4,16 @@ Every entity gets its nodes and elements in one call each (more calls are quadra
 CAD parameter, so that Gmsh can make elements of higher order on them.  Nodes and elements are numbered from 1 without
 gaps: vertices, curves, faces.  Physical groups hang on entities and need nothing.
 
+The seam of a periodic face and its poles need no nodes: `setOrder` finds the place of every node on such faces itself (tried on
+spheres, cylinders and tori with and without parameters; only a curve whose end vertex carries no node made it crash).
+
 Measured with 10^6 quads: 0.13 s where Gmsh's memory is warm, 0.35 s where it is not; the numbers go over without a copy
 but for the + 1.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import gmsh
 import numpy as np
@@ -61,7 +66,7 @@ def vertex_points(model: Model) -> Float:
     return out
 
 
-def put_mesh(model: Model, mesh: QuadMesh) -> None:
+def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | None = None) -> None:
     """Replace the mesh of the current Gmsh model.
 
     All entities lose the mesh they had.  Vertices, curves and faces of `model` get nodes and elements; so do isolated
@@ -72,12 +77,15 @@ def put_mesh(model: Model, mesh: QuadMesh) -> None:
     model : Model
         Read from the current Gmsh model.
     mesh : QuadMesh
+    parameters : sequence of (k, 2) float64 or None, optional
+        For every face the CAD parameters (u, v) of ``mesh.face_nodes``, or None; they spare Gmsh from finding them again.
 
     Raises
     ------
     MeshError
         Gmsh refuses the mesh.
     """
+    of_faces: Sequence[Float | None] = [None] * len(model.faces) if parameters is None else parameters
     with gmsh_errors("taking the mesh"):
         alone = _isolated_points(model)
         alone_points = [gmsh.model.getValue(0, tag, []) for tag in alone]
@@ -93,15 +101,15 @@ def put_mesh(model: Model, mesh: QuadMesh) -> None:
             element += _put_point(tag, node + 1, mesh.points[node], element)
         for number, (tag, point) in enumerate(zip(alone, alone_points), start=len(mesh.points) + 1):
             element += _put_point(tag, number, point, element)
-        for curve, nodes, parameters in zip(model.curves, mesh.curve_nodes, mesh.curve_parameters):
+        for curve, nodes, places in zip(model.curves, mesh.curve_nodes, mesh.curve_parameters):
             first = 0 if free_vertices.pop(int(nodes[0]), False) else 1
-            _put_nodes(1, curve.tag, nodes[first:-1], mesh.points, parameters[first:-1])
+            _put_nodes(1, curve.tag, nodes[first:-1], mesh.points, places[first:-1])
             element += _put_elements(curve.tag, LINE, np.stack([nodes[:-1], nodes[1:]], axis=1), element)
         if np.any(np.diff(mesh.quad_face) < 0):
             raise MeshError("the quads are not ordered by face", remedy="report this model")
         bounds = np.searchsorted(mesh.quad_face, np.arange(len(model.faces) + 1))
-        for row, (face, nodes) in enumerate(zip(model.faces, mesh.face_nodes)):
-            _put_nodes(2, face.tag, nodes, mesh.points)
+        for row, (face, nodes, uv) in enumerate(zip(model.faces, mesh.face_nodes, of_faces, strict=True)):
+            _put_nodes(2, face.tag, nodes, mesh.points, uv)
             element += _put_elements(face.tag, QUAD, mesh.quads[bounds[row] : bounds[row + 1]], element)
 
 
@@ -130,7 +138,8 @@ def _put_nodes(dim: int, tag: int, nodes: Int, points: Float, parameters: Float 
         return
     consecutive = nodes[-1] - nodes[0] == len(nodes) - 1 and bool(np.all(np.diff(nodes) == 1))
     part = points[nodes[0] : nodes[-1] + 1] if consecutive else points[nodes]
-    gmsh.model.mesh.addNodes(dim, tag, (nodes + 1).view(np.uint64), part.ravel(), [] if parameters is None else parameters)
+    places: Float | list[float] = [] if parameters is None else np.ravel(parameters)
+    gmsh.model.mesh.addNodes(dim, tag, (nodes + 1).view(np.uint64), part.ravel(), places)
 
 
 def _put_elements(tag: int, kind: int, nodes: Int, first: int) -> int:
