@@ -53,7 +53,7 @@ class Start:
         return Start(self.uv[rows], self.point[rows], self.first[rows], self.second[rows])
 
 
-def newton(charts: Charts, face: Int, x: Float, start: Start, size: float) -> tuple[Float, Float, Bool]:
+def newton(charts: Charts, face: Int, x: Float, start: Start, size: float, most: int = ROUNDS) -> tuple[Float, Float, Bool]:
     """Feet of points on their faces.
 
     Parameters
@@ -67,6 +67,8 @@ def newton(charts: Charts, face: Int, x: Float, start: Start, size: float) -> tu
         One sample for each point.
     size : float
         Diagonal of the model.
+    most : int
+        Greatest number of rounds.
 
     Returns
     -------
@@ -80,7 +82,7 @@ def newton(charts: Charts, face: Int, x: Float, start: Start, size: float) -> tu
     run = np.arange(len(x))  # the points that are still under way; all other arrays hold these alone
     uv, point, first, second = uv_out.copy(), point_out.copy(), start.first.copy(), start.second
     last, shrink = np.full(len(x), np.inf), np.ones(len(x))
-    for rounds in range(ROUNDS):
+    for rounds in range(most):
         if not len(run):
             break
         r = x - point

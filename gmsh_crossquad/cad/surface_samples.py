@@ -24,6 +24,7 @@ __all__ = ["SurfaceSamples", "surface_samples"]
 POLE = 1e-6  # of the usual |S_u x S_v|
 FINE = 0.3  # radians
 MOST_PARTS = 6
+ROUGH = 2  # rounds
 TURN = 0.5  # radians, greatest turn of a sample's normal
 
 
@@ -199,8 +200,9 @@ def _between(model: Model, charts: Charts, base: SurfaceSamples, corners: Int) -
     at = np.concatenate(begin)
     order = np.argsort(base.face[at], kind="stable")
     at, x = at[order], model.origin + model.scale * np.concatenate(places)[order]
-    uv, _, good = newton(charts, base.face[at], x, base.start[at], model.scale)
-    good &= ~base.at_pole(charts, base.face[at], uv)
+    # any place thereabouts will do
+    uv, _, _ = newton(charts, base.face[at], x, base.start[at], model.scale, ROUGH)
+    good = ~base.at_pole(charts, base.face[at], uv)
     return base.face[at[good]], uv[good]
 
 
