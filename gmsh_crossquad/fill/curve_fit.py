@@ -21,7 +21,7 @@ def curve_fit(mesh: QuadMesh) -> float:
     """Greatest distance of a point on a curve edge from its neighbouring edges, in lengths of the nearest; 0 is perfect."""
     if not mesh.curve_nodes:
         return 0.0
-    edges: Int = np.concatenate([np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes])
+    edges: Int = np.concatenate([np.zeros((0, 2), np.int64), *(np.stack([c[:-1], c[1:]], axis=1) for c in mesh.curve_nodes)])
     return float(misfits(mesh.points[edges[:, 0]], mesh.points[edges[:, 1]]).max(initial=0.0))
 
 
