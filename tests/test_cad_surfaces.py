@@ -15,6 +15,7 @@ from gmsh_crossquad.cad.facets import Facets
 from gmsh_crossquad.cad.surfaces import CadSurfaces
 from gmsh_crossquad.errors import MeshError
 from gmsh_crossquad.records import FaceMesh, Float
+from gmsh_crossquad.surfaces import Planes
 
 DISTANCE: dict[str, Callable[[Float], Float]] = {
     "cylinder": lambda x: np.hypot(x[:, 0], x[:, 1]) - 0.7,
@@ -273,3 +274,14 @@ def test_same_bits_every_time() -> None:
         face = np.zeros(1000, np.int64)
         runs = [(CadSurfaces(model, meshes).feet(face, x), CadSurfaces(model, meshes).normals(face, x)) for _ in range(2)]
         assert np.array_equal(runs[0][0], runs[1][0]) and np.array_equal(runs[0][1], runs[1][1])
+
+
+def test_plane_models_are_their_planes_and_do_not_ask_gmsh(monkeypatch: pytest.MonkeyPatch) -> None:
+    with shape(lambda: gmsh.model.occ.addBox(0, 0, 0, 1, 2, 3), 0.8):
+        model, meshes = records([t for _, t in gmsh.model.getEntities(2)])
+    random = np.random.default_rng(5)
+    face, x = random.integers(6, size=50), random.normal(size=(50, 3))
+    monkeypatch.delattr(gmsh.model, "getCurrent")
+    cad, planes = CadSurfaces(model, meshes), Planes(model)
+    assert np.array_equal(cad.feet(face, x), planes.feet(face, x))
+    assert np.array_equal(cad.normals(face, x), planes.normals(face, x))

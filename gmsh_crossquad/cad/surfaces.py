@@ -101,6 +101,8 @@ class CadSurfaces:
             Where there is no foot.
         """
         face, points = np.asarray(face, np.int64), np.asarray(points, float)
+        if not self.curved.any():
+            return self._planes.feet(face, points)
         out = np.empty_like(points)
         for rows in self._split(face):
             on = face[rows]
@@ -150,6 +152,8 @@ class CadSurfaces:
         (n, 3) float64
         """
         face, points = np.asarray(face, np.int64), np.asarray(points, float)
+        if not self.curved.any():
+            return self._planes.normals(face, points)
         out = np.empty_like(points)
         for rows in self._split(face):
             on, x = face[rows], points[rows]
