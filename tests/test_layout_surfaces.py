@@ -14,10 +14,12 @@ from gmsh_crossquad.errors import LayoutError
 from gmsh_crossquad.field.pipeline import aligned_field
 from gmsh_crossquad.field.smooth import from_angles
 from gmsh_crossquad.field.surface_mesh import SurfaceMesh
-from gmsh_crossquad.layout import bends
+from gmsh_crossquad.layout import bends, face_tmesh
 from gmsh_crossquad.layout.alone import has_divisions
 from gmsh_crossquad.layout.arc_bends import arc_bends
+from gmsh_crossquad.layout.assemble import assemble
 from gmsh_crossquad.layout.blocks import base_complex
+from gmsh_crossquad.layout.branches import branch
 from gmsh_crossquad.layout.chords import arc_divisions, find_chords
 from gmsh_crossquad.layout.cuts import separation_cuts
 from gmsh_crossquad.layout.divisions import BEND, chord_divisions, segments
@@ -26,6 +28,7 @@ from gmsh_crossquad.layout.glue import glue, uncut_euler
 from gmsh_crossquad.layout.handles import handle_cuts, homology
 from gmsh_crossquad.layout.quantize import quantize
 from gmsh_crossquad.layout.quotient import quotient
+from gmsh_crossquad.layout.trace import Growth
 from gmsh_crossquad.layout.verify import problems
 from gmsh_crossquad.records import AlignedField, CrossField, Curve, Face, FaceMesh, FaceTMesh, Float, Model, TMesh
 from tests import models
@@ -157,6 +160,50 @@ def test_dividing_keeps_the_traces_there_were(monkeypatch: pytest.MonkeyPatch) -
     assert len(whole.patches) == 1 < len(tmesh.patches)
     old = whole.polyline[int(np.flatnonzero(whole.loop < 0)[0])]
     assert {tuple(p) for p in old} <= {tuple(p) for line in tmesh.polyline for p in line}
+
+
+@pytest.mark.parametrize(
+    "surface",
+    [
+        sm.torus(0.40637838682287164, (1.0, 0.6206820981360709), (20, 11)),
+        sm.torus(cells=(16, 10), holes=[(3, 5, 1, 3)]),
+    ],
+)
+def test_many_branches_close_to_one_another(surface: SurfaceMesh, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bends, "LONG_TURN", np.radians(60.0))
+    monkeypatch.setattr(bends, "CROSS_TURN", np.radians(15.0))
+    monkeypatch.setattr(bends, "SPREAD", np.radians(5.0))
+    _, mesh = model_of(surface)
+    aligned = aligned_field(mesh)
+    tmesh = trace_face(mesh, aligned)
+    check(mesh, aligned.index, tmesh)
+    assert (tmesh.vertex < 0).sum() > 10
+
+
+def test_a_branch_without_an_end_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, mesh, aligned, _, _ = traced("half torus")
+    grown: list[Growth] = []
+    monkeypatch.setattr(face_tmesh, "Divider", lambda _, growth: grown.append(growth) or Idle())
+    whole = trace_face(mesh, aligned)
+    (growth,) = grown
+    chords = {t: list(found) for t, found in growth.chords.items()}
+    limit, growth.max_steps = growth.max_steps, 1
+    assert not branch(growth, 0, 8, True)
+    assert len(growth.traces) == 1 and {t: c for t, c in growth.chords.items() if c} == chords
+    growth.max_steps = limit
+    assert branch(growth, 0, 9, True) and len(growth.traces) == 2
+    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    seeds = np.unique([trace.seed for trace in growth.traces]).tolist()
+    tmesh, _ = assemble(mesh, surface, aligned, growth.mesh, seeds, growth.traces)
+    check(mesh, aligned.index, tmesh)
+    assert len(tmesh.patches) == len(whole.patches) + 1
+
+
+class Idle:
+    """Divides nothing."""
+
+    def divide(self, *_: object) -> bool:
+        return False
 
 
 @pytest.mark.parametrize("model", [models.annulus(), models.l_shape(), models.disc()])

@@ -1,7 +1,7 @@
 """Traces that begin on an edge of a finished motorcycle graph, and cut one patch in two.
 
 A branch leaves another trace to its left or right, beside the place where that trace crosses an edge, or the boundary straight
-inwards.  Between its beginning and the crossing no other trace crosses the edge, so that it leaves the other trace exactly
+inwards.  It begins at the next place to the crossing, so that no trace can pass between them: it leaves the other trace exactly
 there.  It begins on a side of a patch in the direction that is across this side; as no trace of its own family may be crossed,
 it ends on the opposite side, and both parts have four sides.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import cos, sin
 
 from .crossing import ONE
-from .trace import NUDGE, Growth, Start, Trace
+from .trace import Growth, Start, Trace
 from .trace_mesh import QUARTER
 
 __all__ = ["branch", "branch_inwards"]
@@ -31,21 +31,15 @@ def branch(growth: Growth, host: int, crossing: int, left: bool) -> bool:
     Returns
     -------
     bool
-        False if there is no room beside the crossing; nothing was changed then.
-
-    Raises
-    ------
-    LayoutError
-        If the trace does not end, or there is no way on.
+        False if there is no room beside the crossing, or no way on from there; the traces are as before then.
     """
     mesh, trace = growth.mesh, growth.traces[host]
     q, at = trace.crossings[crossing]
     g = mesh.twin[q]
     side = 1 if left else -1  # the left of a trace is the direction of the half-edge by which it leaves
-    room = min((p - at) * side for p in [*_places(growth, q), 0, ONE] if (p - at) * side > 0)
-    if g < 0 or room < 2:
+    if g < 0:
         return False
-    place = at + side * min(room // 2, NUDGE)
+    place = at + side
     own = next(c for c in growth.chords[q // 3] if c.trace == host and c.segment == crossing)
     here = (own.branch + side) % 4
     there = (here + mesh.shift[q]) % 4
@@ -57,12 +51,11 @@ def branch(growth: Growth, host: int, crossing: int, left: bool) -> bool:
     entry = next((e for e in entries if e[3]), None)
     if entry is None or not growth.take(q, place):
         return False
-    growth.follow(Trace(trace.seed, -1, start=Start(host, crossing, left, entry[0], entry[1])), entry[2])
-    return True
+    return growth.follow(Trace(trace.seed, -1, start=Start(host, crossing, left, entry[0], entry[1])), entry[2])
 
 
 def branch_inwards(growth: Growth, half_edge: int, place: int, vertex: int) -> bool:
-    """Grow a trace from a place on a boundary half-edge; False if the place is taken.
+    """Grow a trace from a place on a boundary half-edge; False if the place is taken, or there is no way on.
 
     Parameters
     ----------
@@ -71,21 +64,8 @@ def branch_inwards(growth: Growth, half_edge: int, place: int, vertex: int) -> b
     half_edge, place : int
     vertex : int
         Any background vertex of the same component.
-
-    Raises
-    ------
-    LayoutError
-        As for `branch`.
     """
     if not growth.take(half_edge, place):
         return False
-    growth.follow(Trace(vertex, -1, start=Start(-1, -1, True, half_edge, place)), (growth.mesh.wall[half_edge] + 1) % 4)
-    return True
-
-
-def _places(growth: Growth, h: int) -> list[int]:
-    """All places that are taken on an edge inside the face, along `h`."""
-    g = growth.mesh.twin[h]
-    first = min(h, g) * 2 * ONE
-    found = [key - first for key in growth.taken if first <= key <= first + ONE]
-    return found if h < g else [ONE - p for p in found]
+    inwards = (growth.mesh.wall[half_edge] + 1) % 4
+    return growth.follow(Trace(vertex, -1, start=Start(-1, -1, True, half_edge, place)), inwards)

@@ -25,6 +25,9 @@ __all__ = ["Divider"]
 MOST_BRANCHES = 200
 """Bound on the branches of a face; what is bent then stays so."""
 
+TRIES = 8
+"""Places on a side where a branch may begin that are tried."""
+
 
 class Divider:
     """Divides bent patches of a finished motorcycle graph by branches.
@@ -49,11 +52,6 @@ class Divider:
         ----------
         tmesh, sources
             The T-mesh of the traces and where its arcs come from, see `assemble`.
-
-        Raises
-        ------
-        LayoutError
-            If a branch does not end, or there is no way on.
         """
         before = self.count
         busy: set[int] = set()
@@ -99,7 +97,7 @@ class Divider:
             reached = float(s[-1])
             at = s[1:-1] if sources[arc][0] >= 0 else 0.5 * (s[1:] + s[:-1])
             places += [(abs(x - wanted), arc, way, k if way > 0 else len(at) - 1 - k) for k, x in enumerate(at.tolist())]
-        return any(self._begin(tmesh, sources[arc], arc, way, rank) for _, arc, way, rank in sorted(places))
+        return any(self._begin(tmesh, sources[arc], arc, way, rank) for _, arc, way, rank in sorted(places)[:TRIES])
 
     def _begin(self, tmesh: FaceTMesh, source: Source, arc: int, way: int, rank: int) -> bool:
         """Grow a branch from the inner point of a trace's arc, or the segment of a boundary arc, with this rank."""

@@ -148,14 +148,23 @@ class Growth:
                 heapq.heapreplace(heap, state)
         return self.traces
 
-    def follow(self, trace: Trace, branch: int) -> None:
-        """Grow a trace that begins on an edge to its end, from `branch` in its first triangle."""
+    def follow(self, trace: Trace, branch: int) -> bool:
+        """Grow a trace that begins on an edge, from `branch` in its first triangle; False, and no trace, if it has no end."""
         assert trace.start is not None
+        i = len(self.traces)
         self.traces.append(trace)
         state: tuple[float, int, int, int, int] | None
-        state = (0.0, len(self.traces) - 1, trace.start.half_edge, trace.start.place, branch)
-        while state is not None:
-            state = self._advance(*state)
+        state = (0.0, i, trace.start.half_edge, trace.start.place, branch)
+        try:
+            while state is not None:
+                state = self._advance(*state)
+        except LayoutError:
+            self.traces.pop()
+            self.closed.pop(i, None)
+            for t in {h // 3 for h, _ in trace.crossings}:
+                self.chords[t] = [chord for chord in self.chords[t] if chord.trace != i]
+            return False
+        return True
 
     def _start(self, vertex: int, number: int, port: Port) -> tuple[float, int, int, int, int]:
         mesh, h = self.mesh, port.half_edge
