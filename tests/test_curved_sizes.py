@@ -143,3 +143,13 @@ def test_too_many_quads_on_a_curved_face() -> None:
         target_sizes(model, meshes, MeshOptions(size=0.01, max_quads=int(number * 1.05)))
         with pytest.raises(InputError, match="quads"):
             target_sizes(model, meshes, MeshOptions(size=0.01, max_quads=int(number * 0.95)))
+
+
+def test_an_apex_ends() -> None:
+    with shape(OCC["cone"]):
+        tag = curved_tag()
+        sizes = measured([tag], MeshSizeFromCurvature=16)
+        assert sizes.face[0].min() >= 1e-5
+        base = (np.array([[1.0, 0.0, 0.0]]) - ORIGIN) / SCALE
+        assert 0.15 < sizes.at_face(0, base)[0] * SCALE < 2 * np.pi / 16 * np.sqrt(2)
+        assert gmsh.option.getNumber("Mesh.MeshSizeMin") == 0

@@ -8,7 +8,8 @@ costs little.  The user's mesh is put back.
 A face without boundary is measured on its seams, or on its triangles where it has no seam (discrete faces).  Where
 `Mesh.MeshSizeFromCurvature` asks for N elements on a full turn, the sizes inside curved faces are at most 2 pi / (N kappa), kappa
 being the greatest principal curvature there.  It is taken from the CAD's derivatives: `getCurvature` of Gmsh 4.15.2 is wrong on
-surfaces of the built-in kernel (0 to 2.9 on a unit sphere).
+surfaces of the built-in kernel (0 to 2.9 on a unit sphere).  These sizes are at least 1e-5 of the model: without a least size
+Gmsh does not come to an end on a curve that runs into the apex of a cone.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ __all__ = ["gmsh_sizes", "triangle_areas"]
 
 TRIAL = 32.0
 MEASURED_EDGES = 100_000.0
+LEAST = 1e-5  # of the model
 MEASURED_ELEMENTS = 3000  # of the coarsened surface mesh
 # An error that Gmsh throws while it meshes leaves its mesher locked for the rest of the session: errors are looked for instead.
 KEPT_OPTIONS = {"General.AbortOnError": 0, "Mesh.ElementOrder": 1, "Mesh.MeshOnlyVisible": 0, "Mesh.MeshOnlyEmpty": 0}
@@ -63,7 +65,7 @@ def gmsh_sizes(model: Model, meshes: tuple[FaceMesh, ...]) -> tuple[tuple[Float,
     """
     snapshot = session.MeshSnapshot.take()
     try:
-        with session.options(**KEPT_OPTIONS):
+        with session.options(**KEPT_OPTIONS, **_floor(model)):
             if not any(gmsh.model.getType(*entity).startswith("Discrete") for entity in gmsh.model.getEntities()):
                 gmsh.model.mesh.clear()  # a mesh that was put back has lost what it knew about periodic curves
             curve, inner = _measured_curves(model, meshes)
@@ -77,6 +79,13 @@ def gmsh_sizes(model: Model, meshes: tuple[FaceMesh, ...]) -> tuple[tuple[Float,
     if not all(np.isfinite(h).all() and (h > 0).all() for h in (*curve, *face)):
         raise MeshError("Gmsh gives no positive size somewhere", remedy="give the size explicitly")
     return curve, face
+
+
+def _floor(model: Model) -> dict[str, float]:
+    """A least size where sizes come from the curvature, which is infinite at an apex."""
+    if not (gmsh.option.getNumber("Mesh.MeshSizeFromCurvature") > 0 and any(face.curved for face in model.faces)):
+        return {}
+    return {"Mesh.MeshSizeMin": max(gmsh.option.getNumber("Mesh.MeshSizeMin"), LEAST * model.scale)}
 
 
 _Places = tuple[Float, Float]
