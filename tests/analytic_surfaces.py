@@ -57,15 +57,16 @@ class Sphere:
 
 @dataclass(frozen=True)
 class Cylinder:
-    """About the z axis, normal outwards."""
+    """About the z axis, normal outwards, or with `side` -1 inwards."""
 
     radius: float = 1.0
+    side: float = 1.0
 
     def normal(self, x: Float) -> Float:
-        return unit(x * [1.0, 1.0, 0.0])
+        return self.side * unit(x * [1.0, 1.0, 0.0])
 
     def foot(self, x: Float) -> Float:
-        return self.radius * self.normal(x) + x * [0.0, 0.0, 1.0]
+        return self.side * self.radius * self.normal(x) + x * [0.0, 0.0, 1.0]
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,28 @@ def tube(mapping: Mapping, nu: int, nv: int, shape: Shape) -> Grid:
         for row, at in ((0, 0.0), (nu, 1.0))
     ]
     return on(*build(mapping(u.ravel(), v.ravel()), _wrapped(index, nu, nv), chains), shape)
+
+
+def bowl(n: int) -> Grid:
+    """A quarter of a plane annulus z = 0, .4 < r < 1, and of the cylinder r = 1, 0 < z < .6 on its outer side."""
+    index = np.arange((2 * n + 1) * (n + 1)).reshape(2 * n + 1, n + 1)
+    u, v = np.meshgrid(np.linspace(-1, 1, 2 * n + 1), np.linspace(0, 1, n + 1), indexing="ij")
+
+    def at(u: Float, v: Float) -> Float:
+        r, angle = 1 + 0.6 * np.minimum(u, 0.0), 0.5 * np.pi * v
+        return np.column_stack([r * np.cos(angle), r * np.sin(angle), 0.6 * np.maximum(u, 0.0)])
+
+    one = np.ones_like
+    chains = [
+        (index[: n + 1, 0].tolist(), lambda t: at(t - 1, 0 * t)),
+        (index[n:, 0].tolist(), lambda t: at(t, 0 * t)),
+        (index[: n + 1, -1].tolist(), lambda t: at(t - 1, one(t))),
+        (index[n:, -1].tolist(), lambda t: at(t, one(t))),
+        *((index[row].tolist(), lambda t, u=u: at(u * one(t), t)) for row, u in ((0, -1.0), (n, 0.0), (2 * n, 1.0))),
+    ]
+    frames = ((np.zeros(3), np.eye(3)[:2]), CURVED)
+    guide, model = build(at(u.ravel(), v.ravel()), grid_quads(2 * n, n), chains, np.repeat([0, 1], n * n), frames)
+    return guide, model, Analytic((Plane(), Cylinder(side=-1.0)))
 
 
 def _wrapped(index: Int, nu: int, nv: int) -> Int:

@@ -28,6 +28,7 @@ from tests.analytic_surfaces import (
     Shape,
     Sphere,
     Torus,
+    bowl,
     closed_torus,
     cube_sphere,
     mapped,
@@ -72,6 +73,7 @@ GRIDS = {
     "pipe": pipe(6, 8),
     "patch": mapped(lambda u, v: torus_points(TORUS, 0.2 + u, 3 * v - 1), 6, 8, TORUS),
     "saddle": saddle(6, 6),
+    "bowl": bowl(5),
 }
 LEAST = {"octant": 0.86, "cube": 0.86, "saddle": 0.75}
 """Three right angles meet at 120 degrees in the regular corner: sin 120 = .866; the others have grids of right angles, but
@@ -84,11 +86,13 @@ def edge_length(guide: Guide) -> float:
 
 
 def check(out: Guide, grid: Grid) -> None:
-    """What holds for every smoothed guide on one curved face."""
+    """What holds for every smoothed guide."""
     guide, model, surfaces = grid
     assert (out.points[guide.fixed] == guide.points[guide.fixed]).all()
     inner = np.flatnonzero((guide.curve < 0) & ~guide.fixed)
-    off = out.points[inner] - surfaces.feet(np.zeros(len(inner), np.int64), out.points[inner])
+    face = np.zeros(len(guide.points), np.int64)
+    face[guide.quads] = guide.quad_face[:, None]
+    off = out.points[inner] - surfaces.feet(face[inner], out.points[inner])
     assert np.abs(off).max() < 1e-12
     sliding = np.flatnonzero((guide.curve >= 0) & ~guide.fixed)
     for row, curve in enumerate(model.curves):
@@ -122,16 +126,17 @@ def test_octant_of_a_sphere_from_a_bad_start(n: int) -> None:
     assert report.min_scaled_jacobian > 0.86
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 10_000))
-def test_any_tangle_of_a_sphere_within_two_edges_is_undone(seed: int) -> None:
-    guide, model, surfaces = grid = cube_sphere(6)
-    out, report = smooth(shaken(grid, 1.0 * edge_length(guide), seed), model, surfaces)
+def test_any_tangle_of_a_sphere_is_undone(seed: int) -> None:
+    """Displacements of half an edge length in the mean: a fifth of the quads is turned over."""
+    guide, model, surfaces = grid = GRIDS["cube"]
+    out, report = smooth(shaken(grid, 0.5 * edge_length(guide), seed), model, surfaces)
     check(out, grid)
     assert report.min_scaled_jacobian > 0.86
 
 
-@pytest.mark.parametrize("name", ["octant", "bend", "saddle"])
+@pytest.mark.parametrize("name", ["octant", "bend", "saddle", "bowl"])
 @pytest.mark.parametrize(("eps", "power", "amplitude"), [(0.0, 4, 0.0), (0.3, 1, 0.5)])
 def test_gradient_of_a_grid(name: str, eps: float, power: int, amplitude: float) -> None:
     guide, model, surfaces = grid = GRIDS[name]

@@ -13,7 +13,8 @@ carried either
 
 which is exact on tubes along any curve and on surfaces of revolution.  Of the lines in both directions the one is
 taken that lies nearest to the surface and whose predictions agree best.  Measured on a whole torus that is one patch: the
-grid from 8 x 4 cells on is valid at the start, while Coons' rule with one projection at the end turns half of it over.
+grid from 8 x 4 cells on is valid at the start (least scaled Jacobian .93 and more), while Coons' rule with one projection at
+the end turns over a quarter of 8 x 4 and two fifths of 40 x 17 cells.
 """
 
 from __future__ import annotations

@@ -26,10 +26,11 @@ SHORTENINGS = 25
 
 @dataclass(frozen=True)
 class Minimum:
-    """Result of `minimise`: the point (n,), its energy, the number of steps and of factorisations."""
+    """Result of `minimise`: the point (n,), its energy and that of the start, the number of steps and of factorisations."""
 
     z: Float
     energy: float
+    first: float
     steps: int
     factorisations: int
 
@@ -68,6 +69,7 @@ def minimise(
     Minimum
     """
     energy, gradient = value(z)
+    first = energy
     taken = renewed = 0
     for _ in range(factorisations):
         solve = factor(z)
@@ -90,10 +92,10 @@ def minimise(
             if curvature > 1e-12 * float(np.sqrt((move @ move) * (change @ change))):
                 moves.append((move, change, 1.0 / curvature))
             if done is not None and done(z):
-                return Minimum(z, energy, taken, renewed)
+                return Minimum(z, energy, first, taken, renewed)
         if before - energy <= tolerance * abs(before):
             break
-    return Minimum(z, energy, taken, renewed)
+    return Minimum(z, energy, first, taken, renewed)
 
 
 def _direction(gradient: Float, moves: list[tuple[Float, Float, float]], solve: Callable[[Float], Float]) -> Float:
