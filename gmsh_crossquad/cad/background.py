@@ -23,7 +23,7 @@ from .opened import opened
 from .outline import Outline, outline
 from .seeds import InnerPoints, inner_points
 from .spacing import curve_spacing, face_sizes
-from .tangents import end_directions
+from .tangents import end_directions, opening
 from .triangulate import OPTIONS, triangulate
 
 __all__ = ["background_meshes", "face_meshes"]
@@ -200,6 +200,5 @@ def _opening_angles(model: Model, row: int, mesh: SurfaceMesh, boundary: Int, cu
         turn = leaving(incoming[v], 1) - leaving(first, 0)
         # the representative nearest to the mesh, but never outside (0, 2 pi]
         turns = round((mesh.angle_sum[v] - turn) / (2 * np.pi))
-        angle = turn + 2 * np.pi * turns
-        out[v] = angle + 2 * np.pi if angle <= 0 else angle - 2 * np.pi if angle > 2 * np.pi + 1e-9 else angle
+        out[v] = opening(turn + 2 * np.pi * turns, float(mesh.angle_sum[v]))
     return np.minimum(out, 2 * np.pi)

@@ -14,7 +14,7 @@ from ..field.surface_mesh import SurfaceMesh
 from ..records import FaceMesh, Float, Int, Model
 from .curved_mesh import CurvedMesh, boundary_of, triangulate_curved
 from .opened import opened
-from .tangents import end_tangents
+from .tangents import end_tangents, opening
 
 __all__ = ["curved_meshes"]
 
@@ -118,6 +118,5 @@ def _opening_angles(model: Model, mesh: SurfaceMesh, boundary: Int, curve: Int, 
             out[v] = shown
             continue
         turn = float(np.arctan2(np.cross(a, b) @ up, a @ b - (a @ up) * (b @ up)))
-        angle = turn + 2 * np.pi * round((shown - turn) / (2 * np.pi))
-        out[v] = angle + 2 * np.pi if angle <= 0 else angle - 2 * np.pi if angle > 2 * np.pi + 1e-9 else angle
+        out[v] = opening(turn + 2 * np.pi * round((shown - turn) / (2 * np.pi)), shown)
     return np.minimum(out, 2 * np.pi)

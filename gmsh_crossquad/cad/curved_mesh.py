@@ -23,8 +23,8 @@ from .sample import evaluate
 __all__ = ["CurvedMesh", "triangulate_curved"]
 
 ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt
-PER_TURN = 20  # triangles per full turn of the surface
-MOST_TRIANGLES, FEW_TRIANGLES = 20_000.0, 600.0  # in the model, and of a face of a large one, because of curvature
+PER_TURN = 16  # triangles per full turn of the surface
+MOST_TRIANGLES, FEW_TRIANGLES = 8_000.0, 250.0  # in the model, and of a face of a large one, because of curvature
 POINT, LINE, TRIANGLE, QUAD = 15, 1, 2, 3
 OPTIONS: dict[str, float] = {
     "Mesh.AlgorithmSwitchOnFailure": 1,
@@ -189,11 +189,13 @@ def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], siz
             mesh.addElementsByType(curve.tag, LINE, element + np.arange(len(ends)), ends.ravel())
             element += len(ends)
     limit, floor = _limits(model, rows, sizes)
-    least = min(limit.values()) if limit else 1.0
+    least, lowest = min(limit.values()), min(floor.values())
     before = getattr(gmsh, "api_callback_", None)
 
     def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
-        return min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least)) if dim == 2 else min(lc, least)
+        if dim == 2:
+            return min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least))
+        return min(max(lc, lowest), least)  # seams: the size from curvature vanishes at an apex
 
     mesh.setSizeCallback(size)
     try:
@@ -211,7 +213,7 @@ def _limits(model: Model, rows: Sequence[int], sizes: Float) -> tuple[dict[int, 
     limit = {model.faces[r].tag: float(sizes[r]) * model.scale for r in rows}
     most = max(MOST_TRIANGLES / len(model.faces), FEW_TRIANGLES)
     floor = {model.faces[r].tag: float(np.sqrt(2.3 * model.faces[r].area / most)) * model.scale for r in rows}
-    return limit, {tag: min(size, limit[tag]) if np.isfinite(size) else 0.0 for tag, size in floor.items()}
+    return limit, {tag: min(size, limit[tag]) if np.isfinite(size) else 0.1 * limit[tag] for tag, size in floor.items()}
 
 
 def _curves(model: Model, row: int) -> list[int]:

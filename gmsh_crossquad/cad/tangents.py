@@ -18,12 +18,13 @@ from ..records import Curve, Face, Float, Model
 from .sample import evaluate
 from .session import gmsh_errors
 
-__all__ = ["cad_tangents", "end_directions", "end_tangents", "sector_angles"]
+__all__ = ["cad_tangents", "end_directions", "end_tangents", "opening", "sector_angles"]
 
 TRUST = np.cos(np.radians(30.0))
 AGREE = np.cos(np.radians(1.0))
 OFFSETS = (1e-6, 1e-5, 1e-4, 1e-3)  # of the parameter range
 SMOOTH = np.cos(np.radians(10.0))
+CUSP = np.radians(0.5)
 NARROW = np.radians(1.0)
 
 
@@ -115,6 +116,21 @@ def end_directions(model: Model, face_row: int) -> dict[tuple[int, int], float]:
     for row, (start, end) in zip(rows, angles):
         out[row, 0], out[row, 1] = start, end
     return out
+
+
+def opening(angle: float, shown: float) -> float:
+    """Opening angle in (0, 2 pi] of a sector.
+
+    Parameters
+    ----------
+    angle : float
+        From the tangents, the representative nearest to `shown`.
+    shown : float
+        Angle of the triangles in the sector.  It counts where the tangents of both curves agree (a cusp).
+    """
+    if abs(angle) < CUSP:
+        return shown
+    return angle + 2 * np.pi if angle <= 0 else angle - 2 * np.pi if angle > 2 * np.pi + 1e-9 else angle
 
 
 def sector_angles(model: Model, face_row: int) -> tuple[Float, ...]:

@@ -19,6 +19,7 @@ __all__ = ["validate"]
 
 NO_WIDTH = 1e-9  # of the face's size
 SHARPEST = np.radians(0.5)
+PARTING = np.radians(3.0)  # of the chords of curves that touch in a corner
 SAME = 1e-9  # of the model
 ON_CURVE = 1e-6  # of the model: the accuracy of the samples
 LIPS = 1e-6  # of the model: lips of a crack that are drawn twice
@@ -123,6 +124,8 @@ def _check_corners(model: Model, row: int, angles: tuple[Float, ...]) -> None:
     for loop, corner in zip(face.loops, angles):
         for i in np.flatnonzero(corner < SHARPEST):
             c, sign = loop[i]
+            if _parting(model, face, loop[i], loop[i - 1]) > PARTING:
+                continue  # a cusp: the curves touch in the corner and part
             _too_sharp(model, model.curves[c].start if sign > 0 else model.curves[c].end, float(corner[i]))
     if not face.embedded_curves:
         return
@@ -137,6 +140,19 @@ def _check_corners(model: Model, row: int, angles: tuple[Float, ...]) -> None:
             gap = (b - a) % (2 * np.pi)
             if len(ends) > 1 and (inner_a or inner_b) and min(gap, 2 * np.pi - gap) < SHARPEST:
                 _too_sharp(model, vertex, min(gap, 2 * np.pi - gap))
+
+
+def _parting(model: Model, face: Face, leaving: tuple[int, int], arriving: tuple[int, int]) -> float:
+    """Angle between the chords of two curves from their common corner to the same arc length, half of the shorter curve."""
+    curves = [model.curves[c] for c, _ in (leaving, arriving)]
+    reach = 0.5 * min(curve.length for curve in curves)
+    starts = (leaving[1] > 0, arriving[1] < 0)
+    chords = []
+    for curve, start in zip(curves, starts):
+        s = np.array([0.0, reach] if start else [curve.length, curve.length - reach])
+        chords.append(np.diff(face.local(curve.at(s)), axis=0)[0])
+    a, b = chords
+    return float(abs(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b)))
 
 
 def _too_sharp(model: Model, vertex: int, angle: float) -> None:
