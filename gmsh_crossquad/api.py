@@ -7,8 +7,10 @@ from typing import Any
 
 from .arguments import check_options
 from .cad.files import is_running
+from .cad.high_order import element_order, raise_order
 from .cad.put import put_mesh
 from .cad.session import MeshSnapshot, gmsh_errors, guest
+from .cad.surfaces import CadSurfaces
 from .errors import InputError
 from .face_field import face_field
 from .field_result import FieldResult
@@ -22,8 +24,8 @@ __all__ = ["cross_field", "mesh"]
 def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = None, **options: Any) -> MeshResult:
     """Mesh the current Gmsh model with quads, in place.
 
-    The mesh goes on the model's own entities: physical groups survive, and `gmsh.write`, `setOrder` or a 3D mesh on top work
-    as after ``gmsh.model.mesh.generate(2)``.  Faces in physical surfaces are meshed where there are any, else all.
+    The mesh goes on the model's own entities: physical groups survive, and `gmsh.write` or a 3D mesh on top work as after
+    ``gmsh.model.mesh.generate(2)``.  Faces in physical surfaces are meshed where there are any, else all.
     If anything goes wrong, the model's former mesh, the options and the current model are as before.
 
     Parameters
@@ -33,8 +35,8 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     progress : callable, optional
         Called with the name of every stage when it starts.
     **options
-        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `max_quads`, `block_size`,
-        `background`.  What is not given here may be set in the model, as ONELAB parameters "CrossQuad/...".
+        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `order`, `incomplete`, `max_quads`,
+        `block_size`, `background`.  What is not given here may be set in the model, as ONELAB parameters "CrossQuad/...".
 
     Returns
     -------
@@ -56,16 +58,23 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     watch = Watch(progress)
     with guest():
         checked = session_options(size=size, **options)
+        order, incomplete = element_order(checked.order, checked.incomplete)
         snapshot = MeshSnapshot.take()
         try:
             snapshot.clear()
             stages = block_mesh(checked, watch)
             with watch.stage("put"), gmsh_errors("putting the mesh on the model"):
                 put_mesh(stages.model, stages.mesh)
+            raised: tuple[str, ...] = ()
+            if order > 1:
+                with watch.stage("order"):
+                    surfaces = CadSurfaces(stages.model, stages.meshes)
+                    raised = raise_order(stages.model, surfaces, stages.mesh, order, incomplete=incomplete)
         except BaseException:
             snapshot.restore()
             raise
-    return MeshResult(stages, dict(watch.seconds), tuple(dict.fromkeys((*stages.notes, *stages.mesh.notes))))
+    notes = tuple(dict.fromkeys((*stages.notes, *stages.mesh.notes, *raised)))
+    return MeshResult(stages, dict(watch.seconds), notes, order, incomplete)
 
 
 def cross_field(size: float | None = None, *, progress: Callable[[str], None] | None = None, **options: Any) -> FieldResult:

@@ -36,7 +36,9 @@ def check_options(**options: Any) -> MeshOptions:
         if count != int(count):
             raise InputError(f"max_quads is {count:g}", remedy="give a whole number")
         options["max_quads"] = int(count)
-    for name in ("fix_indices", "relax"):
+    if options.get("order") not in (None, 1, 2, 3) or isinstance(options.get("order"), bool):
+        raise InputError(f"order is {options['order']!r}", remedy="use order 1, 2 or 3")
+    for name in ("fix_indices", "relax", "incomplete"):
         if name in options and options[name] not in (True, False, None, 0, 1):
             raise InputError(f"{name} is {options[name]!r}", remedy="give True or False")
     if isinstance(options.get("field"), str):

@@ -48,6 +48,13 @@ def _parser() -> argparse.ArgumentParser:
     mesh.add_argument("--size", type=float, metavar="H", help="target edge length (default: the sizes of the model)")
     mesh.add_argument("--max-quads", type=int, metavar="N", help="refuse to make more quads than this (default: 10000000)")
     mesh.add_argument("--block-size", type=float, metavar="F", help="wanted block edge over the size (default: 4)")
+    mesh.add_argument("--order", type=int, metavar="P", help="order of the elements, 1 to 3 (default: Mesh.ElementOrder)")
+    mesh.add_argument(
+        "--incomplete",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="quads of order 2 with 8 nodes, not 9 (default: Mesh.SecondOrderIncomplete)",
+    )
     mesh.add_argument("--picture", metavar="PNG", help="draw cross field, block layout and mesh")
     mesh.add_argument("--vtu", metavar="VTU", help="write mesh, layout and field for ParaView")
 
@@ -158,7 +165,7 @@ def _display(arguments: argparse.Namespace) -> Display:
 def _mesh(arguments: argparse.Namespace) -> int:
     from .formats import MESH_FORMATS
 
-    values = _options(arguments, ("size", "max_quads", "block_size", "field", "fix_indices", "relax"))
+    values = _options(arguments, ("size", "max_quads", "block_size", "order", "incomplete", "field", "fix_indices", "relax"))
     answer = _run_with_outputs("cli:mesh_task", arguments, values, MESH_FORMATS)
     if not arguments.quiet:
         _print_outcome(arguments, answer)
@@ -252,8 +259,9 @@ def _print_outcome(arguments: argparse.Namespace, answer: dict[str, Any]) -> Non
         print(f"note: {note}")
     q = answer["quality"]
     blocks = "1 block" if q["blocks"] == 1 else f"{q['blocks']} blocks"
+    quads = "quads" if answer["order"] == 1 else f"quads of order {answer['order']}"
     print(
-        f"{arguments.output}: {q['quads']} quads in {blocks}, scaled Jacobian min {q['min_scaled_jacobian']:.3f} "
+        f"{arguments.output}: {q['quads']} {quads} in {blocks}, scaled Jacobian min {q['min_scaled_jacobian']:.3f} "
         f"mean {q['mean_scaled_jacobian']:.3f}, {q['irregular']} irregular vertices"
     )
 
@@ -286,6 +294,10 @@ def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any
             open_model(job["model"])
         with stage("load"):
             from .api import mesh
+            from .cad.high_order import element_order
+            from .formats import check_order
+        given = job["options"].get
+        check_order(job["output"], *element_order(given("order"), given("incomplete")))
         result = mesh(progress=emit, **_decoded(job["options"]))
         stage.seconds |= result.timings
         with stage("write"):
@@ -298,7 +310,7 @@ def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any
         if "picture" in job:
             with stage("picture"):
                 result.picture(job["picture"])
-    return {"quality": quality, "notes": list(result.notes), "timings": stage.seconds}
+    return {"quality": quality, "order": result.order, "notes": list(result.notes), "timings": stage.seconds}
 
 
 def field_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:

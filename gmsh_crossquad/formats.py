@@ -1,7 +1,8 @@
 """Mesh file formats by extension, and what must hold of the paths before any work is done.
 
 Gmsh writes all of them but `.vtu`, which goes through meshio.  Formats that hold geometry and no mesh, or no quads, are
-refused, so that nobody waits for a file without a mesh in it.
+refused, so that nobody waits for a file without a mesh in it; and so are those that lose nodes or elements of a higher order
+(what Gmsh 4.15.2 writes was read again).
 """
 
 from __future__ import annotations
@@ -11,7 +12,15 @@ from pathlib import Path
 
 from .errors import GeometryError, InputError
 
-__all__ = ["MESH_FORMATS", "PICTURE_FORMATS", "check_input", "check_output", "check_suffix", "temporary_beside"]
+__all__ = [
+    "MESH_FORMATS",
+    "PICTURE_FORMATS",
+    "check_input",
+    "check_order",
+    "check_output",
+    "check_suffix",
+    "temporary_beside",
+]
 
 MESH_FORMATS = (
     ".msh",
@@ -42,6 +51,11 @@ MESH_FORMATS = (
 """Extensions that `gmsh-crossquad mesh -o` accepts."""
 
 PICTURE_FORMATS = (".png",)
+
+_MSH = tuple(suffix for suffix in MESH_FORMATS if suffix.startswith(".msh"))
+_SECOND = (*_MSH, ".bdf", ".cgns", ".dat", ".inp", ".m", ".med", ".nas", ".vtk", ".vtu")
+_HIGH_ORDER = {(2, False): _SECOND, (2, True): tuple(sorted((*_SECOND, ".key", ".unv"))), (3, False): (*_MSH, ".cgns", ".vtu")}
+"""Formats that carry elements by order and whether the quads have no node inside."""
 
 
 def check_input(path: str | os.PathLike[str]) -> None:
@@ -76,6 +90,29 @@ def check_suffix(path: str | os.PathLike[str], allowed: tuple[str, ...], what: s
     if suffix not in allowed:
         said = f"unknown {what} format {suffix!r}" if suffix else f"the {what} {os.fspath(path)!r} has no extension"
         raise InputError(said, remedy="use one of " + " ".join(allowed))
+
+
+def check_order(path: str | os.PathLike[str], order: int, incomplete: bool) -> None:
+    """Check that a format carries elements of an order.
+
+    Parameters
+    ----------
+    path : path
+    order : {1, 2, 3}
+    incomplete : bool
+        Quads of order 2 have 8 nodes.
+
+    Raises
+    ------
+    InputError
+    """
+    suffix = Path(path).suffix.lower()
+    if order == 1 or suffix in _HIGH_ORDER[order, incomplete and order == 2]:
+        return
+    if order == 2 and not incomplete and suffix in _HIGH_ORDER[2, True]:
+        raise InputError(f"{suffix} files hold no quads of 9 nodes", remedy="use --incomplete (8 nodes) or another format")
+    remedy = "use --order 1 or one of " + " ".join(_HIGH_ORDER[order, incomplete and order == 2])
+    raise InputError(f"{suffix} files hold no quads of order {order}", remedy=remedy)
 
 
 def check_output(path: str | os.PathLike[str]) -> Path:

@@ -36,6 +36,10 @@ class MeshOptions:
     relax : bool or None
         Move singular points that the user set: always, so that the flux around holes vanishes; never; None: only if there is no
         layout otherwise, not even with a pair of singularities added.
+    order : {1, 2, 3} or None
+        Order of the elements; None takes `Mesh.ElementOrder`.
+    incomplete : bool or None
+        Quads of order 2 with 8 nodes instead of 9; None takes `Mesh.SecondOrderIncomplete`.
     """
 
     size: float | None = None
@@ -46,3 +50,5 @@ class MeshOptions:
     boundary_index: Mapping[Any, Any] = dataclasses.field(default_factory=dict)
     fix_indices: bool = False
     relax: bool | None = None
+    order: int | None = None
+    incomplete: bool | None = None

@@ -44,11 +44,17 @@ class MeshResult:
         Wall seconds of every stage.
     notes : tuple of str
         Fall-backs that were taken and other things worth knowing.
+    order : int
+        Order of the elements in Gmsh; all numbers here are of the straight quads.
+    incomplete : bool
+        Quads of order 2 have 8 nodes.
     """
 
     stages: Stages
     timings: Mapping[str, float] = attribute(default_factory=dict)
     notes: tuple[str, ...] = ()
+    order: int = 1
+    incomplete: bool = False
 
     @property
     def mesh(self) -> QuadMesh:

@@ -67,7 +67,9 @@ def write_mesh(path: str | os.PathLike[str]) -> None:
     groups = gmsh.model.getPhysicalGroups()
     save_all = 1.0 if not any(dim == 2 for dim, _ in groups) else gmsh.option.getNumber("Mesh.SaveAll")
     if Path(path).suffix.lower() == ".vtu":
-        _write_vtu(path, bool(save_all))
+        from .vtu_mesh import write_vtu_mesh
+
+        write_vtu_mesh(path, bool(save_all))
     else:
         with options(**{"Mesh.SaveAll": save_all}), gmsh_errors(f"writing {os.fspath(path)!r}"):
             gmsh.write(os.fspath(path))
@@ -167,23 +169,3 @@ def read_mesh() -> MeshArrays:
         groups=physical_groups(),
         physical=physical,
     )
-
-
-def _write_vtu(path: str | os.PathLike[str], save_all: bool) -> None:
-    """The mesh of the current model through meshio, physical numbers and entity tags as cell data."""
-    import meshio
-
-    mesh = read_mesh()
-    blocks, physical, entity = [], [], []
-    for kind, dim, cells, tags in (("line", 1, mesh.lines, mesh.line_entity), ("quad", 2, mesh.quads, mesh.quad_entity)):
-        number = np.array([mesh.physical.get((dim, t), 0) for t in range(int(tags.max(initial=0)) + 1)], np.int64)[tags]
-        keep = np.ones(len(tags), bool) if save_all else number > 0
-        if keep.any():
-            blocks.append((kind, cells[keep]))
-            physical.append(number[keep])
-            entity.append(tags[keep])
-    used = np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
-    new = np.full(len(mesh.points), -1, np.int64)
-    new[used] = np.arange(len(used))
-    data = {"physical": physical, "entity": entity}
-    meshio.Mesh(mesh.points[used], [(kind, new[cells]) for kind, cells in blocks], cell_data=data).write(path, file_format="vtu")

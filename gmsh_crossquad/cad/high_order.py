@@ -10,20 +10,39 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from ..errors import MeshError
+from ..errors import InputError, MeshError
 from ..fill.high_order import high_order
 from ..records import Float, Int, Model, QuadMesh
 from ..surfaces import Surfaces
 from .put import curve_points
 from .session import gmsh_errors
 
-__all__ = ["raise_order"]
+__all__ = ["element_order", "raise_order"]
 
 LINES = {2: 8, 3: 26}  # Gmsh's element types by order
 QUADS = {2: 10, 3: 36}
+INCOMPLETE = 16, 8  # type and number of nodes of the quad of order 2 without a node inside
 
 
-def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int) -> tuple[str, ...]:
+def element_order(order: int | None, incomplete: bool | None) -> tuple[int, bool]:
+    """Order of the elements, and whether quads of order 2 have 8 nodes; for None Gmsh's own options.
+
+    Raises
+    ------
+    InputError
+        `Mesh.ElementOrder` is no order that can be made.
+    """
+    if order is None:
+        wanted = gmsh.option.getNumber("Mesh.ElementOrder")
+        if wanted not in (1, 2, 3):
+            raise InputError(f"Mesh.ElementOrder is {wanted:g}", remedy="use order 1, 2 or 3")
+        order = int(wanted)
+    if incomplete is None:
+        incomplete = gmsh.option.getNumber("Mesh.SecondOrderIncomplete") != 0
+    return order, bool(incomplete) and order == 2
+
+
+def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, *, incomplete: bool = False) -> tuple[str, ...]:
     """Make the elements of the current Gmsh model those of a higher order, with all nodes on the CAD.
 
     Parameters
@@ -34,6 +53,8 @@ def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int) ->
         As `put_mesh` has just put it.
     order : {1, 2, 3}
         1 changes nothing.
+    incomplete : bool
+        At order 2, quads without a node inside.
 
     Returns
     -------
@@ -49,18 +70,23 @@ def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int) ->
     """
     if order == 1:
         return ()
-    new = high_order(model, surfaces, mesh, order, lambda row, t: curve_points(model, row, t))
+    new = high_order(model, surfaces, mesh, order, lambda row, t: curve_points(model, row, t), incomplete=incomplete)
+    kind, kept = INCOMPLETE if incomplete else (QUADS[order], (order + 1) ** 2)
+    quads = new.quads[:, :kept]
+    n = len(mesh.points)
+    used = np.ones(n + len(new.points), bool)
+    used[new.quads[:, kept:]] = False
     with gmsh_errors("raising the order"):
-        # isolated points have numbers after those of the mesh
-        shift = int(gmsh.model.mesh.getMaxNodeTag()) - len(mesh.points)
-        tags = np.arange(1, len(mesh.points) + len(new.points) + 1)
-        tags[len(mesh.points) :] += shift
+        # isolated points have numbers after those of the mesh (Gmsh's greatest number may be that of a mesh of before)
+        shift = sum(int(np.sum(gmsh.model.mesh.getNodes(*point)[0] > n)) for point in gmsh.model.getEntities(0))
+        tags = np.cumsum(used)
+        tags[n:] += shift
         for curve, nodes, parameters, lines in zip(model.curves, new.curve_nodes, new.curve_parameters, new.lines, strict=True):
-            _replace(1, curve.tag, LINES[order], tags[lines], tags[nodes], new.points[nodes - len(mesh.points)], parameters)
+            _replace(1, curve.tag, LINES[order], tags[lines], tags[nodes], new.points[nodes - n], parameters)
         bounds = np.searchsorted(mesh.quad_face, np.arange(len(model.faces) + 1))
         for row, (face, nodes) in enumerate(zip(model.faces, new.face_nodes, strict=True)):
-            quads = tags[new.quads[bounds[row] : bounds[row + 1]]]
-            _replace(2, face.tag, QUADS[order], quads, tags[nodes], new.points[nodes - len(mesh.points)], [])
+            nodes = nodes[used[nodes]]
+            _replace(2, face.tag, kind, tags[quads[bounds[row] : bounds[row + 1]]], tags[nodes], new.points[nodes - n], [])
     return new.notes
 
 

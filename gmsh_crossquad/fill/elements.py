@@ -58,8 +58,8 @@ class Elements:
         length = np.linalg.norm(x[edges[:, 1]] - x[edges[:, 0]], axis=1)
         return cls(model, surfaces, mesh, order, x, edges, quad_edges, length, straight, np.zeros_like(straight), inside)
 
-    def put_on_faces(self, on_curve: Bool) -> None:
-        """Put all that is inside curved faces on these."""
+    def put_on_faces(self, on_curve: Bool, *, inside: bool = True) -> None:
+        """Put the nodes of edges inside curved faces on these, and those inside quads."""
         q = np.flatnonzero(self.surfaces.curved[self.mesh.quad_face])
         if not len(q):
             return
@@ -67,8 +67,9 @@ class Elements:
         edge_face[self.quad_edges[q]] = self.mesh.quad_face[q, None]
         e = np.flatnonzero((edge_face >= 0) & ~on_curve)
         self.bulge[e] = self._feet(edge_face[e], self.straight[e]) - self.straight[e]
-        x = self.grids(q)[:, 1:-1, 1:-1]
-        self.inside[q] = self._feet(self.mesh.quad_face[q], x) - x
+        if inside:
+            x = self.grids(q)[:, 1:-1, 1:-1]
+            self.inside[q] = self._feet(self.mesh.quad_face[q], x) - x
 
     def _feet(self, face: Int, points: Float) -> Float:
         """Points (m, ..., 3) of faces (m,) next to `points`."""

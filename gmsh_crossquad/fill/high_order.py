@@ -67,7 +67,13 @@ class HighOrder:
 
 
 def high_order(
-    model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, evaluate: Callable[[int, Float], Float]
+    model: Model,
+    surfaces: Surfaces,
+    mesh: QuadMesh,
+    order: int,
+    evaluate: Callable[[int, Float], Float],
+    *,
+    incomplete: bool = False,
 ) -> HighOrder:
     """Elements of order 2 or 3 on the CAD.
 
@@ -79,6 +85,8 @@ def high_order(
     order : {2, 3}
     evaluate : callable (curve row, parameters (m,)) -> (m, 3)
         Exact points of a CAD curve, in the user's coordinates.
+    incomplete : bool
+        Nodes inside quads follow from those around them (Coons' rule), so that the quads may do without.
 
     Raises
     ------
@@ -105,7 +113,7 @@ def high_order(
     uses = np.bincount(quad_edges.ravel(), minlength=len(edges))
     if np.any(uses[~on_curve] != 2):
         raise MeshError("an edge inside a face has not two quads", remedy="report this model")
-    work.put_on_faces(on_curve)
+    work.put_on_faces(on_curve, inside=not incomplete)
     count, straighter = work.mend()
     notes: tuple[str, ...] = ()
     if count:
