@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -53,7 +54,8 @@ class FaceField:
         Their midpoints, where the crosses sit.
     directions, given : (e, 3) float64
         Unit vector of one arm of every cross of v and of u; the others are at quarter turns about `normal`.
-    normal : (3,) float64
+    normal : (3,) float64, on a curved face (e, 3)
+        Unit normal, of a curved face at every edge.
     phi, psi : (e,) float64
         Radians.  psi vanishes on the boundary and has jumps of quarter turns; phi has none.
     theta : (e,) float64
@@ -91,6 +93,49 @@ class FaceField:
     seeds: Float
 
     @property
+    def curved(self) -> bool:
+        """Whether the face has another normal at every edge."""
+        return self.normal.ndim == 2
+
+    @property
+    def normals(self) -> Float:
+        """(e, 3) unit normals at the edges."""
+        return np.broadcast_to(self.normal, self.directions.shape)
+
+    @cached_property
+    def surface(self) -> SurfaceMesh:
+        """The background mesh with its topology."""
+        return SurfaceMesh(self.points, self.triangles)
+
+    @cached_property
+    def triangle_arms(self) -> Float:
+        """(m, 3) unit vector of one arm of the cross in every triangle: its fourth power is the mean over the three edges."""
+        edges = self.surface.triangle_edges
+        if self.curved:
+            x, y = self.triangle_axes
+            arms = self.directions[edges]
+            fourth = (np.einsum("tkc,tc->tk", arms, x) + 1j * np.einsum("tkc,tc->tk", arms, y)) ** 4
+        else:
+            x = self.directions[0]
+            y = np.cross(self.normal, x)
+            fourth = ((self.directions @ x + 1j * (self.directions @ y)) ** 4)[edges]
+        angle = np.angle(fourth.sum(axis=1)) / 4
+        return np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
+
+    @property
+    def triangle_normals(self) -> Float:
+        """(m, 3) unit normals of the triangles."""
+        own = self.surface.triangle_normal if self.curved else None
+        return np.broadcast_to(self.normal, (len(self.triangles), 3)) if own is None else own
+
+    @property
+    def triangle_axes(self) -> tuple[Float, Float]:
+        """Unit vectors (m, 3) along the first side of every triangle, and a quarter turn counter-clockwise of it."""
+        a, b = self.points[self.triangles[:, 0]], self.points[self.triangles[:, 1]]
+        x = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+        return x, np.cross(self.triangle_normals, x)
+
+    @property
     def summary(self) -> str:
         """One line: singularities, flux around the holes, misalignment."""
         inside = singularities_of(self)
@@ -108,14 +153,18 @@ def face_field(model: Model, mesh: FaceMesh, aligned: AlignedField) -> FaceField
     face = model.faces[mesh.face]
     surface = SurfaceMesh(mesh.points, mesh.triangles)
     a, b = mesh.points[surface.edges[:, 0]], mesh.points[surface.edges[:, 1]]
-    along = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0])
+    own = surface.edge_normal if face.curved else None
+    normal = face.normal if own is None else own
 
     def world(local: Float) -> Float:
         out: Float = model.origin + model.scale * face.world(local)
         return out
 
     def arms(theta: Float) -> Float:
-        angle = along + theta
+        if own is not None:
+            x = (b - a) / surface.edge_length[:, None]
+            return np.cos(theta)[:, None] * x + np.sin(theta)[:, None] * np.cross(own, x)
+        angle = np.arctan2(b[:, 1] - a[:, 1], b[:, 0] - a[:, 0]) + theta
         out: Float = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ face.axes
         return out
 
@@ -127,7 +176,7 @@ def face_field(model: Model, mesh: FaceMesh, aligned: AlignedField) -> FaceField
         places=world(0.5 * (a + b)),
         directions=arms(aligned.field.theta),
         given=arms(aligned.given.theta),
-        normal=np.cross(face.axes[0], face.axes[1]),
+        normal=normal,
         phi=aligned.phi,
         psi=aligned.psi,
         theta=aligned.field.theta,
@@ -143,6 +192,6 @@ def face_field(model: Model, mesh: FaceMesh, aligned: AlignedField) -> FaceField
 def singularities_of(field: FaceField) -> list[Singularity]:
     """The singularities inside a face."""
     boundary = np.zeros(len(field.points), bool)
-    boundary[field.edges[SurfaceMesh(field.points, field.triangles).boundary_edge].ravel()] = True
+    boundary[field.edges[field.surface.boundary_edge].ravel()] = True
     rows = np.flatnonzero(~boundary & (field.index != 0))
     return [Singularity(field.points[v], int(field.index[v]), field.face) for v in rows.tolist()]

@@ -9,7 +9,7 @@ the Crouzeix–Raviart form sit.  The corner nodes carry the mean of the midpoin
                   seed         1 at singular points that the user set
     cell arrays   face         Gmsh tag of the surface
                   rotation     of v, from edge k to edge k + 1: all integers of the field live here
-                  normal       of the surface
+                  normal       of the surface, of a curved one that of the triangle
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from .errors import FieldError
 from .face_field import FaceField
 from .field.surface_mesh import SurfaceMesh
 from .records import Float, Int
+from .source.power import tangent_axes
 
 __all__ = ["CELL_ARRAYS", "POINT_ARRAYS", "field_from_arrays", "quadratic"]
 
@@ -36,7 +37,7 @@ def quadratic(faces: Sequence[FaceField]) -> tuple[Float, Int, dict[str, Any]]:
     data: dict[str, list[Any]] = {name: [] for name in (*POINT_ARRAYS, *CELL_ARRAYS)}
     first = 0
     for f in faces:
-        surface = SurfaceMesh(f.points, f.triangles)
+        surface = f.surface
         n, e, m = len(f.points), len(f.edges), len(f.triangles)
         points += [f.points, f.places]
         cells.append(first + np.concatenate([f.triangles, n + surface.triangle_edges], axis=1))
@@ -52,7 +53,7 @@ def quadratic(faces: Sequence[FaceField]) -> tuple[Float, Int, dict[str, Any]]:
         data["seed"].append(seed)
         data["face"].append(np.full(m, f.face))
         data["rotation"].append(f.rotation)
-        data["normal"].append(np.tile(f.normal, (m, 1)))
+        data["normal"].append(np.array(f.triangle_normals))
         first += n + e
     return np.concatenate(points), np.concatenate(cells), {name: np.concatenate(parts) for name, parts in data.items()}
 
@@ -76,7 +77,9 @@ def field_from_arrays(points: Float, cells: Int, data: dict[str, Any]) -> tuple[
         surface = SurfaceMesh(points[corners], triangles)
         middle = np.empty(len(surface.edges), np.int64)
         middle[surface.triangle_edges.ravel()] = mine[:, 3:].ravel()
-        normal = data["normal"][np.flatnonzero(data["face"] == tag)[0]]
+        normals = np.asarray(data["normal"], float)[data["face"] == tag]
+        around = surface.edge_normal if np.any(normals != normals[0]) else None
+        normal = normals[0] if around is None else around
         a, b = points[corners][surface.edges[:, 0]], points[corners][surface.edges[:, 1]]
         x = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
         v = np.asarray(data["v"], float)[middle]
@@ -117,9 +120,23 @@ def _mean(f: FaceField, values: Float) -> Float:
 
 def _at_corners(f: FaceField, arms: Float) -> Float:
     """(n, 3) one arm at every vertex: the mean of the fourth powers around it (any arm where that vanishes)."""
+    if f.surface.vertex_normal is not None and f.curved:
+        return _at_curved_corners(f, arms, f.surface.vertex_normal)
     x = f.directions[0]
     y = np.cross(f.normal, x)
     fourth = (arms @ x + 1j * (arms @ y)) ** 4
     angle = np.arctan2(_mean(f, fourth.imag), _mean(f, fourth.real)) / 4
+    out: Float = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
+    return out
+
+
+def _at_curved_corners(f: FaceField, arms: Float, normal: Float) -> Float:
+    """The same in the tangent planes of the vertices, whose normals are (n, 3)."""
+    x, y = tangent_axes(normal)
+    vertex, arm = f.edges.ravel(), np.repeat(arms, 2, axis=0)
+    plane = np.einsum("kc,kc->k", arm, x[vertex]) + 1j * np.einsum("kc,kc->k", arm, y[vertex])
+    fourth = plane**4
+    total = np.bincount(vertex, fourth.real, len(normal)) + 1j * np.bincount(vertex, fourth.imag, len(normal))
+    angle = np.angle(total) / 4
     out: Float = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
     return out

@@ -8,13 +8,13 @@ of the opening angles.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
 from .cad.indices import prescribed_indices
 from .cad.seeds import face_seeds
-from .errors import FieldError, LayoutError
+from .errors import FieldError, GeometryError, LayoutError, MeshError
 from .field.compatibility import Incompatible, Misfit, quarter_text
 from .field.corners import boundary_indices
 from .field.edge_frames import EdgeFrames
@@ -30,6 +30,7 @@ from .source.smooth import Smooth
 __all__ = ["Rule", "Wishes", "changes_of", "edge_frames", "field_of_face", "located", "wishes"]
 
 Rule = Literal["keep", "harmonic", "relaxed", "divisible"]
+Located = TypeVar("Located", LayoutError, GeometryError, MeshError)
 
 MOST_LISTED = 12
 
@@ -109,7 +110,8 @@ def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
     """Where the sources are asked for the field of a face."""
     face = model.faces[mesh.face]
     surface = SurfaceMesh(mesh.points, mesh.triangles)
-    normal = np.broadcast_to(np.cross(face.axes[0], face.axes[1]), (len(surface.edges), 3))
+    own = surface.edge_normal if face.curved else None
+    normal = np.broadcast_to(face.normal, (len(surface.edges), 3)) if own is None else own
     return EdgeFrames(face.tag, surface, model.origin + model.scale * face.world(mesh.points), normal)
 
 
@@ -134,7 +136,7 @@ def field_of_face(
     ------
     FieldError
         If the source has no usable field there, or its singularities do not fit the boundary indices.
-    LayoutError
+    GeometryError, LayoutError
     """
     source = wanted.sources[mesh.face]
     index, chosen = _boundary(model, mesh, wanted)
@@ -158,6 +160,8 @@ def field_of_face(
         )
     except Incompatible as error:
         raise _named(model, mesh, error.misfit) from None
+    except GeometryError as error:
+        raise located(model, mesh.face, error) from None
     notes = changes_of(model, mesh, index, aligned)
     if rule != "keep" and not isinstance(source, (Smooth, Singularities)):  # those are harmonic
         notes.append(f"the given field of surface {model.faces[mesh.face].tag} was smoothed, its singularities kept")
@@ -246,9 +250,9 @@ def changes_of(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) 
     return notes
 
 
-def located(model: Model, face: int, error: LayoutError) -> LayoutError:
-    """The error of a face's stage with the face's tag and the place in the user's coordinates."""
-    place = error.location
-    if place is not None and len(place) == 2:
-        place = tuple((model.origin + model.scale * model.faces[face].world(np.array([place]))[0]).tolist())
-    return LayoutError(error.what, entity=error.entity or (2, model.faces[face].tag), location=place, remedy=error.remedy)
+def located(model: Model, face: int, error: Located) -> Located:
+    """The error of a face's stage with the face's tag and the place in the user's coordinates; of the same class."""
+    place, record = error.location, model.faces[face]
+    if place is not None and len(place) == len(record.axes):  # in local coordinates
+        place = tuple((model.origin + model.scale * record.world(np.array([place]))[0]).tolist())
+    return type(error)(error.what, entity=error.entity or (2, record.tag), location=place, remedy=error.remedy)

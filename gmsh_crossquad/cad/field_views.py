@@ -98,8 +98,11 @@ def add_field_views(faces: Sequence[FaceField]) -> dict[str, int]:
 
 def _across(faces: Sequence[FaceField], arms: Float) -> Float:
     """The other arms of crosses at the nodes of all faces."""
-    normal = np.concatenate([np.tile(f.normal, (len(f.points) + len(f.edges), 1)) for f in faces])
-    return np.cross(normal, arms)
+    normals = []
+    for f in faces:
+        own = f.surface.vertex_normal if f.curved else None
+        normals += [np.broadcast_to(f.normal, f.points.shape) if own is None else own, f.normals]
+    return np.cross(np.concatenate(normals), arms)
 
 
 def _put_mesh(faces: Sequence[FaceField], points: Float, cells: Int, face: Int) -> list[int]:

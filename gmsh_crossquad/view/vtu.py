@@ -19,29 +19,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..embed.quality import scaled_jacobian
-from ..field.surface_mesh import SurfaceMesh
 from ..formats import check_output, check_suffix, temporary_beside
 from ..records import Float, Int
 
 if TYPE_CHECKING:
-    from ..face_field import FaceField
     from .subject import Subject
 
 __all__ = ["write_vtu"]
 
 _WHOLE = {"part": 0, "face": -1, "block": -1, "layout_edge": -1, "curve": -1, "index": 0}
 _REAL = {"scaled_jacobian": (), "cross_1": (3,), "cross_2": (3,)}
-
-
-def _triangle_crosses(f: FaceField) -> Float:
-    """Unit vector (m, 3) of one arm of the cross in every triangle: the fourth power is averaged over its three edges."""
-    surface = SurfaceMesh(f.points, f.triangles)
-    x = f.directions[0]
-    y = np.cross(f.normal, x)
-    fourth = ((f.directions @ x) + 1j * (f.directions @ y)) ** 4
-    angle = np.angle(fourth[surface.triangle_edges].sum(axis=1)) / 4
-    return np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
 
 
 def write_vtu(result: Subject, path: str | os.PathLike[str]) -> None:
@@ -73,8 +60,7 @@ def write_vtu(result: Subject, path: str | os.PathLike[str]) -> None:
             cells.append((kind, connectivity))
             rows.append(values)
 
-    value = scaled_jacobian(mesh.points, mesh.quads, result.normals[mesh.quad_face])
-    add("quad", mesh.quads, part=0, face=tags[mesh.quad_face], block=mesh.quad_block, scaled_jacobian=value)
+    add("quad", mesh.quads, part=0, face=tags[mesh.quad_face], block=mesh.quad_block, scaled_jacobian=result.quad_quality)
     edges = result.layout.edges
     number = np.repeat(np.arange(len(edges)), [e.divisions for e in edges])
     curve = np.array([-1 if e.curve is None else e.curve for e in edges], np.int64)
@@ -82,8 +68,8 @@ def write_vtu(result: Subject, path: str | os.PathLike[str]) -> None:
     add("line", segments, part=1, layout_edge=number, curve=curve[number])
     first = len(mesh.points)
     for f in result.field:
-        arm = _triangle_crosses(f)
-        add("triangle", f.triangles + first, part=2, face=f.face, cross_1=arm, cross_2=np.cross(f.normal, arm))
+        arm = f.triangle_arms
+        add("triangle", f.triangles + first, part=2, face=f.face, cross_1=arm, cross_2=np.cross(f.triangle_normals, arm))
         points.append(f.points)
         first += len(f.points)
     spots = result.singularities
