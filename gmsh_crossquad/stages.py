@@ -58,7 +58,14 @@ class Attempt(NamedTuple):
 
 
 # in the order in which they are tried until the mesh is good
-ATTEMPTS = (Attempt(), Attempt(blocks=0.4), Attempt(capped=False), Attempt(blocks=0.15), Attempt(background=0.7))
+ATTEMPTS = (
+    Attempt(),
+    Attempt(blocks=0.4),
+    Attempt(capped=False),
+    Attempt(blocks=0.15),
+    Attempt(background=0.7),
+    Attempt(rule="divisible"),
+)
 GIVEN_ATTEMPTS = (
     Attempt(),
     Attempt(rule="divisible"),

@@ -25,6 +25,7 @@ ENDLESS = 1e22
 OWN_OPEN, OWN_CLOSED = 2, 4  # segments that Gmsh makes itself, at most
 FINE_NODES = 2000  # in the second mesh, on all curves together
 PLAIN = {
+    "General.AbortOnError": 0,  # homology that the user asks for fails on a mesh of curves
     "Mesh.MeshSizeFromPoints": 0,
     "Mesh.MeshSizeFromCurvature": 0,
     "Mesh.MeshSizeFactor": 1,

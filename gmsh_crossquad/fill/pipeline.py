@@ -191,6 +191,7 @@ class _Work:
         on_surfaces = cells.frames.curved, cells.surfaces
         skeleton.put_cubics(np.flatnonzero(~topology.on_curve), topology, tangents, *on_surfaces)
         worst = cells.place(np.arange(len(quad_edges)), self.points)
+        worst = self._bend(worst, tangents)
         even = np.zeros(len(edges))
         for share in SHARES:
             bad: Bool = worst <= 0.0 if share == 1.0 else worst < KEEP * np.maximum(own, POOR)
@@ -212,6 +213,40 @@ class _Work:
             again = np.flatnonzero(np.any(soft[quad_edges], axis=1))
             worst[again] = cells.place(again, self.points)
         skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)
+        return worst
+
+
+    def _bend(self, worst: Float, tangents: Float) -> Float:
+        """Let the inner sides of folded cells run along the CAD curve on the other side, where that is better.
+
+        Between two curves that touch in a corner and part slowly a straight side would cross them at any size of the cells.
+        """
+        cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
+        for q in np.flatnonzero(worst <= 0.0).tolist():
+            for k in range(4):
+                e, o = topology.quad_edges[q, k].item(), topology.quad_edges[q, (k + 2) % 4].item()
+                if topology.on_curve[e] or not topology.on_curve[o] or skeleton.divisions[e] < 2:
+                    continue
+                nodes = skeleton.vertices[topology.edges[o]]
+                line = np.concatenate([nodes[:1], skeleton.edge(o), nodes[1:]])
+                if cells.reverse(np.array([q]), k)[0] != cells.reverse(np.array([q]), (k + 2) % 4)[0]:
+                    line = line[::-1]
+                ends = skeleton.vertices[topology.edges[e]]
+                chord, other = ends[1] - ends[0], line[-1] - line[0]
+                ratio = float(np.linalg.norm(chord) / max(float(np.linalg.norm(other)), np.finfo(float).tiny))
+                slopes = (len(line) - 1) * np.stack([line[1] - line[0], line[-1] - line[-2]])
+                before = tangents[e].copy()
+                tangents[e] = chord + ratio * (slopes - other)
+                again = np.flatnonzero((topology.quad_edges == e).any(axis=1))
+                on_surfaces = cells.frames.curved, cells.surfaces
+                skeleton.put_cubics(np.array([e]), topology, tangents, *on_surfaces)
+                new = cells.place(again, self.points)
+                if new.min() > worst[again].min():
+                    worst[again] = new
+                else:
+                    tangents[e] = before
+                    skeleton.put_cubics(np.array([e]), topology, tangents, *on_surfaces)
+                    cells.place(again, self.points)
         return worst
 
 
