@@ -10,7 +10,7 @@ from typing import Any
 from .errors import InputError
 from .options import MeshOptions
 
-__all__ = ["check_options"]
+__all__ = ["check_options", "parse_extrusion"]
 
 _NAMES = tuple(f.name for f in dataclasses.fields(MeshOptions))
 
@@ -50,6 +50,24 @@ def check_options(**options: Any) -> MeshOptions:
     elif not isinstance(options["boundary_index"], Mapping):
         raise InputError(f"boundary_index is {options['boundary_index']!r}", remedy="give a dict of point tags to indices")
     return MeshOptions(**options)
+
+
+def parse_extrusion(text: str) -> tuple[float | list[float], int]:
+    """Length or vector, and number of layers, from ``LENGTH:LAYERS`` or ``DX,DY,DZ:LAYERS``.
+
+    Raises
+    ------
+    InputError
+    """
+    remedy = "write LENGTH:LAYERS or DX,DY,DZ:LAYERS, for example 2:8"
+    along, _, layers = text.rpartition(":")
+    try:
+        values, count = [float(x) for x in along.split(",")], int(layers)
+    except ValueError:
+        raise InputError(f"the extrusion is {text!r}", remedy=remedy) from None
+    if len(values) not in (1, 3) or count < 1 or not all(map(math.isfinite, values)) or not any(values):
+        raise InputError(f"the extrusion is {text!r}", remedy=remedy)
+    return values[0] if len(values) == 1 else values, count
 
 
 def _positive(name: str, value: Any) -> float:

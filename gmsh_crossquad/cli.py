@@ -55,6 +55,11 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         help="quads of order 2 with 8 nodes, not 9 (default: Mesh.SecondOrderIncomplete)",
     )
+    mesh.add_argument(
+        "--extrude",
+        metavar="LENGTH:LAYERS",
+        help="sweep a plane model into hexahedra along its normal (or DX,DY,DZ:LAYERS along a vector)",
+    )
     mesh.add_argument("--picture", metavar="PNG", help="draw cross field, block layout and mesh")
     mesh.add_argument("--vtu", metavar="VTU", help="write mesh, layout and field for ParaView")
 
@@ -163,10 +168,13 @@ def _display(arguments: argparse.Namespace) -> Display:
 
 
 def _mesh(arguments: argparse.Namespace) -> int:
-    from .formats import MESH_FORMATS
+    from .arguments import parse_extrusion
+    from .formats import MESH_FORMATS, VOLUME_FORMATS
 
+    sweep = parse_extrusion(arguments.extrude) if arguments.extrude is not None else None
     values = _options(arguments, ("size", "max_quads", "block_size", "order", "incomplete", "field", "fix_indices", "relax"))
-    answer = _run_with_outputs("cli:mesh_task", arguments, values, MESH_FORMATS)
+    formats = MESH_FORMATS if sweep is None else VOLUME_FORMATS
+    answer = _run_with_outputs("cli:mesh_task", arguments, values, formats, extrude=sweep)
     if not arguments.quiet:
         _print_outcome(arguments, answer)
     return 0
@@ -217,7 +225,9 @@ def _decoded(values: dict[str, Any]) -> dict[str, Any]:
     return {**values, "boundary_index": pairs}
 
 
-def _run_with_outputs(task: str, arguments: argparse.Namespace, values: dict[str, Any], formats: tuple[str, ...]) -> Any:
+def _run_with_outputs(
+    task: str, arguments: argparse.Namespace, values: dict[str, Any], formats: tuple[str, ...], **more: Any
+) -> Any:
     """Run a task in the child; its files get their names when all of them are complete."""
     from .child import run
     from .errors import InputError
@@ -237,7 +247,7 @@ def _run_with_outputs(task: str, arguments: argparse.Namespace, values: dict[str
     if len(set(places.values())) < len(places):
         raise InputError("two outputs have the same name", remedy="choose another name for one")
     unfinished = {kind: temporary_beside(place) for kind, place in places.items()}
-    job = {"model": arguments.model, "options": values, "verbose": arguments.verbose}
+    job = {"model": arguments.model, "options": values, "verbose": arguments.verbose, **more}
     job |= {kind: str(path) for kind, path in unfinished.items()}
     try:
         answer = run(task, job, _display(arguments))
@@ -263,6 +273,7 @@ def _print_outcome(arguments: argparse.Namespace, answer: dict[str, Any]) -> Non
     print(
         f"{arguments.output}: {q['quads']} {quads} in {blocks}, scaled Jacobian min {q['min_scaled_jacobian']:.3f} "
         f"mean {q['mean_scaled_jacobian']:.3f}, {q['irregular']} irregular vertices"
+        + (f"; {answer['hexahedra']} hexahedra" if answer["hexahedra"] else "")
     )
 
 
@@ -296,21 +307,33 @@ def mesh_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any
             from .api import mesh
             from .cad.high_order import element_order
             from .formats import check_order
+            from .options import MeshOptions
         given = job["options"].get
-        check_order(job["output"], *element_order(given("order"), given("incomplete")))
+        sweep = job["extrude"]
+        check_order(job["output"], *element_order(given("order"), given("incomplete")), volumes=sweep is not None)
         result = mesh(progress=emit, **_decoded(job["options"]))
         stage.seconds |= result.timings
-        with stage("write"):
-            write_mesh(job["output"])
         with stage("measure"):
             quality = asdict(result.quality)
+        hexahedra = 0
+        if sweep is not None:
+            with stage("extrude"):
+                hexahedra = result.extrude(*sweep, most=given("max_quads", MeshOptions.max_quads)).hexahedra
+        with stage("write"):
+            write_mesh(job["output"])
         if "vtu" in job:
             with stage("vtu"):
                 result.write_vtu(job["vtu"])
         if "picture" in job:
             with stage("picture"):
                 result.picture(job["picture"])
-    return {"quality": quality, "order": result.order, "notes": list(result.notes), "timings": stage.seconds}
+    return {
+        "quality": quality,
+        "order": result.order,
+        "hexahedra": hexahedra,
+        "notes": list(result.notes),
+        "timings": stage.seconds,
+    }
 
 
 def field_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, Any]:

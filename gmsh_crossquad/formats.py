@@ -15,6 +15,7 @@ from .errors import GeometryError, InputError
 __all__ = [
     "MESH_FORMATS",
     "PICTURE_FORMATS",
+    "VOLUME_FORMATS",
     "check_input",
     "check_order",
     "check_output",
@@ -36,7 +37,6 @@ MESH_FORMATS = (
     ".inp",
     ".key",
     ".m",
-    ".mail",
     ".med",
     ".mesh",
     ".nas",
@@ -52,10 +52,21 @@ MESH_FORMATS = (
 
 PICTURE_FORMATS = (".png",)
 
+VOLUME_FORMATS = tuple(suffix for suffix in MESH_FORMATS if suffix not in (".obj", ".off", ".wrl"))
+"""Those that hold hexahedra."""
+
 _MSH = tuple(suffix for suffix in MESH_FORMATS if suffix.startswith(".msh"))
-_SECOND = (*_MSH, ".bdf", ".cgns", ".dat", ".inp", ".m", ".med", ".nas", ".vtk", ".vtu")
-_HIGH_ORDER = {(2, False): _SECOND, (2, True): tuple(sorted((*_SECOND, ".key", ".unv"))), (3, False): (*_MSH, ".cgns", ".vtu")}
-"""Formats that carry elements by order and whether the quads have no node inside."""
+_BOTH = (*_MSH, ".cgns", ".dat", ".inp", ".m", ".med", ".vtk", ".vtu")
+_EIGHT = (*_BOTH, ".bdf", ".key", ".nas", ".unv")
+# by order, whether the elements have no node inside, and whether there are hexahedra
+_HIGH_ORDER = {
+    (2, False, False): (*_BOTH, ".bdf", ".nas"),
+    (2, True, False): _EIGHT,
+    (3, False, False): (*_MSH, ".cgns", ".vtu"),
+    (2, False, True): _BOTH,
+    (2, True, True): _EIGHT,
+    (3, False, True): _MSH,
+}
 
 
 def check_input(path: str | os.PathLike[str]) -> None:
@@ -92,7 +103,7 @@ def check_suffix(path: str | os.PathLike[str], allowed: tuple[str, ...], what: s
         raise InputError(said, remedy="use one of " + " ".join(allowed))
 
 
-def check_order(path: str | os.PathLike[str], order: int, incomplete: bool) -> None:
+def check_order(path: str | os.PathLike[str], order: int, incomplete: bool, *, volumes: bool = False) -> None:
     """Check that a format carries elements of an order.
 
     Parameters
@@ -100,19 +111,24 @@ def check_order(path: str | os.PathLike[str], order: int, incomplete: bool) -> N
     path : path
     order : {1, 2, 3}
     incomplete : bool
-        Quads of order 2 have 8 nodes.
+        Elements of order 2 have no node inside.
+    volumes : bool
+        There are hexahedra.
 
     Raises
     ------
     InputError
     """
     suffix = Path(path).suffix.lower()
-    if order == 1 or suffix in _HIGH_ORDER[order, incomplete and order == 2]:
+    if order == 1:
         return
-    if order == 2 and not incomplete and suffix in _HIGH_ORDER[2, True]:
-        raise InputError(f"{suffix} files hold no quads of 9 nodes", remedy="use --incomplete (8 nodes) or another format")
-    remedy = "use --order 1 or one of " + " ".join(_HIGH_ORDER[order, incomplete and order == 2])
-    raise InputError(f"{suffix} files hold no quads of order {order}", remedy=remedy)
+    fit = _HIGH_ORDER[order, incomplete and order == 2, volumes]
+    if suffix in fit:
+        return
+    what = f"{suffix} files hold no {'hexahedra' if volumes else 'quads'} of order {order}"
+    if order == 2 and not incomplete and suffix in _HIGH_ORDER[2, True, volumes]:
+        raise InputError(f"{what} with a node inside", remedy="use --incomplete or another format")
+    raise InputError(what, remedy="use --order 1 or one of " + " ".join(fit))
 
 
 def check_output(path: str | os.PathLike[str]) -> Path:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from dataclasses import field as attribute
 from functools import cached_property
 from os import PathLike
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .block_layout import Block, Edge, Layout, build_layout
 from .face_field import FaceField, Singularity, face_field, singularities_of
 from .quality import Quality, measure_quality, quad_quality
 from .records import AlignedField, FaceMesh, Float, Model, QuadMesh
+
+if TYPE_CHECKING:
+    from .cad.extrude import Extrusion
 
 __all__ = ["Block", "Edge", "FaceField", "Layout", "MeshResult", "Singularity", "Stages"]
 
@@ -95,6 +98,40 @@ class MeshResult:
     def singularities(self) -> tuple[Singularity, ...]:
         """The singularities inside the faces."""
         return tuple(s for f in self.field for s in singularities_of(f))
+
+    def extrude(
+        self, along: float | Sequence[float], layers: int, *, most: int | None = None, name: str | None = None
+    ) -> Extrusion:
+        """Sweep the mesh of a plane model into hexahedra, in a new Gmsh model, which becomes the current one.
+
+        Physical surfaces become physical volumes of the same name, their ends NAME_bottom and NAME_top, physical curves the
+        side walls; see `gmsh_crossquad.cad.extrude`.
+
+        Parameters
+        ----------
+        along : float or (3,) sequence of float
+            Length along the normal of the first face, or the whole vector.
+        layers : int
+            Number of hexahedra along it.
+        most : int, optional
+            Refuse to make more hexahedra.
+        name : str, optional
+            Name of the new model.
+
+        Returns
+        -------
+        Extrusion
+
+        Raises
+        ------
+        InputError
+            Without the mesh in the current Gmsh model, for a vector along the faces, and too few or too many layers.
+        GeometryError
+            For faces that are curved or not parallel.
+        """
+        from .cad.extrude import extrude
+
+        return extrude(self.stages.model, along, layers, most=most, name=name)
 
     def write_vtu(self, path: str | PathLike[str]) -> None:
         """Write mesh, layout, field and singularities for ParaView; see `gmsh_crossquad.view.vtu`."""

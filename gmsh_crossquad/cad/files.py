@@ -57,15 +57,15 @@ def write_mesh(path: str | os.PathLike[str]) -> None:
     """Write the mesh of the current model in the format of the extension, with Gmsh's rule for physical groups.
 
     Gmsh saves the elements in physical groups where there are any.  A model with groups of points and curves only would be
-    saved without a single quad: there everything is saved.
+    saved without a single quad, an extruded one with groups of surfaces only without hexahedra: there everything is saved.
 
     Raises
     ------
     MeshError
         If the file cannot be written in full.
     """
-    groups = gmsh.model.getPhysicalGroups()
-    save_all = 1.0 if not any(dim == 2 for dim, _ in groups) else gmsh.option.getNumber("Mesh.SaveAll")
+    highest = 3 if len(gmsh.model.mesh.getElementTypes(3)) else 2
+    save_all = 1.0 if not gmsh.model.getPhysicalGroups(highest) else gmsh.option.getNumber("Mesh.SaveAll")
     if Path(path).suffix.lower() == ".vtu":
         from .vtu_mesh import write_vtu_mesh
 

@@ -1,7 +1,8 @@
 """The mesh of the current model as a .vtu file, through meshio; elements of order 2 and 3 as such.
 
 VTK has cells of their own for order 2, with Gmsh's order of nodes, and Lagrange cells for order 3.  The edges of these run
-along the coordinates u and v, not around the quad, and the nodes inside follow row by row.
+along the coordinates u and v, not around the quad, and the nodes inside follow row by row.  Hexahedra have the edges of the start
+and of the end, each around, and those between; then the faces to -x, x, -y, y, -z, z and the middle.
 """
 
 from __future__ import annotations
@@ -29,12 +30,15 @@ CELLS = {
     3: _Cell("quad"),
     16: _Cell("quad8"),
     10: _Cell("quad9"),
+    5: _Cell("hexahedron"),
+    17: _Cell("hexahedron20", (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15)),
+    12: _Cell("hexahedron27", (*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26)),
     36: _Cell("VTK_LAGRANGE_QUADRILATERAL", (0, 1, 2, 3, 4, 5, 6, 7, 9, 8, 11, 10, 12, 13, 15, 14)),
 }
 
 
 def write_vtu_mesh(path: str | os.PathLike[str], save_all: bool) -> None:
-    """Write lines and quads with physical numbers and entity tags as cell data.
+    """Write lines, quads and hexahedra with physical numbers and entity tags as cell data.
 
     Parameters
     ----------
@@ -48,7 +52,7 @@ def write_vtu_mesh(path: str | os.PathLike[str], save_all: bool) -> None:
     row = np.zeros(int(tags.max()) + 1, np.int64)
     row[tags.astype(np.int64)] = np.arange(len(tags))
     found: dict[int, list[tuple[Int, Int, Int]]] = {kind: [] for kind in CELLS}
-    for dim, tag in gmsh.model.getEntities(1) + gmsh.model.getEntities(2):
+    for dim, tag in [e for d in (1, 2, 3) for e in gmsh.model.getEntities(d)]:
         groups = gmsh.model.getPhysicalGroupsForEntity(dim, tag)
         if not len(groups) and not save_all:
             continue
