@@ -45,7 +45,7 @@ class Wishes:
         One per face.
     indices : dict of (face row, vertex row) -> int
         Prescribed indices of boundary vertices in quarter turns.
-    seeds : tuple of (k, 2) float64
+    seeds : tuple of (k, 2) or (k, 3) float64
         Singular points of every face that must be vertices of its background mesh; local coordinates.
     fix : bool
         Change indices that do not fit together.
@@ -99,11 +99,25 @@ def wishes(model: Model, options: MeshOptions) -> Wishes:
                 remedy = "take its index away, or use the field 'smooth' or 'singularities'"
                 raise FieldError("a singular point is set in a face whose field has its own", entity=(0, tag), remedy=remedy)
         sources.append(source)
-    seeds = []
-    for row, source in enumerate(sources):
-        points = source.points()
-        seeds.append(face_seeds(model, points)[row] if len(points) else np.zeros((0, 2)))
-    return Wishes(tuple(sources), boundary, tuple(seeds), options.fix_indices)
+    return Wishes(tuple(sources), boundary, _seeds(model, whole), options.fix_indices)
+
+
+def _seeds(model: Model, whole: FieldSource) -> tuple[Float, ...]:
+    """The singular points of the sources in every face; those in the model's names are CAD vertices already."""
+    out = [np.zeros((0, len(face.axes))) for face in model.faces]
+    rows: dict[int, list[int]] = {}
+    source = {}
+    for row, face in enumerate(model.faces):
+        own = whole.of(face.tag) if isinstance(whole, PerFace) else whole
+        rows.setdefault(id(own), []).append(row)
+        source[id(own)] = own
+    for key, mine in rows.items():
+        points = source[key].points()
+        if len(points):
+            found = face_seeds(model, points, mine, strict=isinstance(source[key], Singularities))
+            for row in mine:
+                out[row] = found[row]
+    return tuple(out)
 
 
 def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
@@ -112,7 +126,9 @@ def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
     surface = SurfaceMesh(mesh.points, mesh.triangles)
     own = surface.edge_normal if face.curved else None
     normal = np.broadcast_to(face.normal, (len(surface.edges), 3)) if own is None else own
-    return EdgeFrames(face.tag, surface, model.origin + model.scale * face.world(mesh.points), normal)
+    points = model.origin + model.scale * face.world(mesh.points)
+    marked = (mesh.seed >= 0) | ((mesh.vertex >= 0) & ~surface.boundary_vertex)
+    return EdgeFrames(face.tag, surface, points, normal, marked)
 
 
 def field_of_face(

@@ -14,6 +14,7 @@ from ..field.surface_mesh import SurfaceMesh
 from ..records import FaceMesh, Float, Int, Model
 from .curved_mesh import CurvedMesh, boundary_of, triangulate_curved
 from .opened import opened
+from .seeds import InnerPoints
 from .tangents import end_tangents, opening
 
 __all__ = ["curved_meshes"]
@@ -21,19 +22,23 @@ __all__ = ["curved_meshes"]
 STEEP = 0.4  # sine of the angle between a tangent and the surface from which the surface has none
 
 
-def curved_meshes(model: Model, rows: list[int], spacing: tuple[Float, ...], sizes: Float) -> list[FaceMesh]:
+def curved_meshes(
+    model: Model, rows: list[int], spacing: tuple[Float, ...], sizes: Float, inner: tuple[InnerPoints, ...] | None = None
+) -> list[FaceMesh]:
     """Background meshes of the curved faces `rows`.
 
     Parameters
     ----------
     model, rows, spacing, sizes
         As for `curved_mesh.triangulate_curved`.
+    inner : tuple of InnerPoints, optional
+        Points inside every face of the model that must be vertices.
 
     Raises
     ------
     MeshError
     """
-    made = triangulate_curved(model, rows, spacing, sizes)
+    made = triangulate_curved(model, rows, spacing, sizes, {} if inner is None else {row: inner[row] for row in rows})
     if not made:
         return []
     offset = np.concatenate([[0], np.cumsum([len(m.points) for m in made])])
@@ -68,6 +73,7 @@ def _face_mesh(model: Model, row: int, own: CurvedMesh, mesh: SurfaceMesh, sourc
         vertex=vertex,
         opening_angle=angle,
         port=asked & (smooth | ~mesh.boundary_vertex),
+        seed=np.where(old, own.seed[np.maximum(source, 0)], -1),
         parameters=np.where(old[:, None], own.parameters[np.maximum(source, 0)], np.nan),
     )
 

@@ -3,14 +3,16 @@
 Gmsh meshes them where they are, with everything it knows about seams, poles and trimmed parameter planes.  The nodes on the
 curves are given and put there first; Gmsh meshes only what is still empty: seams, then the faces.  Plane faces are hidden
 meanwhile.  The user's mesh and the visibility of entities are put back.  A face where the mesh does not have the given nodes on
-its boundary, is no manifold or has the wrong Euler characteristic is made again with another algorithm.
+its boundary, is no manifold or has the wrong Euler characteristic is made again with another algorithm.  Around points that must
+be vertices the triangles are small from the start; the points are put in afterwards (`curved_seeds`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import gmsh
 import numpy as np
@@ -18,7 +20,9 @@ import numpy as np
 from ..errors import MeshError
 from ..records import Bool, Float, Int, Model
 from . import session
+from .curved_seeds import with_vertices
 from .sample import evaluate
+from .seeds import GROWTH, InnerPoints
 
 __all__ = ["CurvedMesh", "triangulate_curved"]
 
@@ -26,6 +30,7 @@ ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt
 PER_TURN = 16  # triangles per full turn of the surface
 MOST_TRIANGLES, FEW_TRIANGLES = 8_000.0, 250.0  # in the model, and of a face of a large one, because of curvature
 POINT, LINE, TRIANGLE, QUAD = 15, 1, 2, 3
+NONE: Mapping[int, InnerPoints] = MappingProxyType({})
 OPTIONS: dict[str, float] = {
     "Mesh.AlgorithmSwitchOnFailure": 1,
     "Mesh.ElementOrder": 1,
@@ -69,6 +74,8 @@ class CurvedMesh:
         Row of `Model.vertices` or -1.
     segments : (k, 2) int64; curve : (k,) int64; arclength : (k, 2) float64
         Segments of all curves of the face, in the direction of their curve, as in `outline.Outline`.
+    seed : (n,) int64
+        Row of the face's seeds or -1; all -1 where it is left out.
     """
 
     points: Float
@@ -78,6 +85,11 @@ class CurvedMesh:
     segments: Int
     curve: Int
     arclength: Float
+    seed: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def __post_init__(self) -> None:
+        if not len(self.seed):
+            object.__setattr__(self, "seed", np.full(len(self.points), -1))
 
 
 @dataclass(frozen=True)
@@ -94,7 +106,13 @@ class _Given:
         return np.concatenate([[curve.start + 1], inner, [curve.end + 1]])
 
 
-def triangulate_curved(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], sizes: Float) -> list[CurvedMesh]:
+def triangulate_curved(
+    model: Model,
+    rows: Sequence[int],
+    spacing: tuple[Float, ...],
+    sizes: Float,
+    inner: Mapping[int, InnerPoints] = NONE,
+) -> list[CurvedMesh]:
     """Triangles of the faces `rows`.
 
     Parameters
@@ -107,6 +125,8 @@ def triangulate_curved(model: Model, rows: Sequence[int], spacing: tuple[Float, 
         Arc lengths of the nodes of every curve.
     sizes : (f,) float64, scaled
         Greatest size of triangles in every face.
+    inner : mapping of int to InnerPoints, optional
+        Points inside faces that must be vertices, by row.
 
     Raises
     ------
@@ -125,10 +145,10 @@ def triangulate_curved(model: Model, rows: Sequence[int], spacing: tuple[Float, 
                 if not todo:
                     break
                 with session.options(**{"Mesh.Algorithm": algorithm}):
-                    given = _generate(model, todo, spacing, sizes)
+                    given = _generate(model, todo, spacing, sizes, inner)
                 for row in todo:
                     try:
-                        done[row] = _collect(model, row, spacing, given)
+                        done[row] = _seeded(_collect(model, row, spacing, given), inner.get(row))
                     except MeshError as error:
                         problem[row] = error.what
     finally:
@@ -136,9 +156,7 @@ def triangulate_curved(model: Model, rows: Sequence[int], spacing: tuple[Float, 
     for row in rows:
         if row not in done:
             remedy = "check this surface in Gmsh: it must be able to triangulate it"
-            raise MeshError(
-                f"no valid background triangles ({problem[row]})", entity=(2, model.faces[row].tag), remedy=remedy
-            )
+            raise MeshError(f"no valid background triangles ({problem[row]})", entity=(2, model.faces[row].tag), remedy=remedy)
     return [done[r] for r in rows]
 
 
@@ -159,11 +177,14 @@ def _only(tags: Sequence[int]) -> Iterator[None]:
             gmsh.model.setVisibility([e], value)
 
 
-def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], sizes: Float) -> _Given:
+def _generate(
+    model: Model, rows: Sequence[int], spacing: tuple[Float, ...], sizes: Float, inner: Mapping[int, InnerPoints]
+) -> _Given:
     """Put the given nodes on the curves and let Gmsh mesh what is empty."""
     mesh = gmsh.model.mesh
     used = {c for r in rows for c in _curves(model, r)}
     vertices = {v for c in used for v in (model.curves[c].start, model.curves[c].end)}
+    vertices |= {v for r in rows for v in model.faces[r].embedded_points}
     with session.gmsh_errors("preparing the background mesh"):
         mesh.clear()
         # vertices of the CAD that the model has left out get their node from Gmsh
@@ -173,9 +194,9 @@ def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], siz
                 point = model.vertices[v] * model.scale + model.origin
                 mesh.addNodes(0, tag, [v + 1], point)
                 mesh.addElementsByType(tag, POINT, [v + 1], [v + 1])
-        inner = np.array([len(s) - 2 for s in spacing], np.int64)
-        first = len(model.vertices) + 1 + np.cumsum(inner) - inner
-        given = _Given(first, len(model.vertices) + int(inner.sum()))
+        own_nodes = np.array([len(s) - 2 for s in spacing], np.int64)
+        first = len(model.vertices) + 1 + np.cumsum(own_nodes) - own_nodes
+        given = _Given(first, len(model.vertices) + int(own_nodes.sum()))
         element = len(model.vertices) + 1
         for c in sorted(used):
             curve, s = model.curves[c], spacing[c]
@@ -190,12 +211,19 @@ def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], siz
             element += len(ends)
     limit, floor = _limits(model, rows, sizes)
     least, lowest = min(limit.values()), min(floor.values())
+    around = _around(model, rows, inner)
     before = getattr(gmsh, "api_callback_", None)
 
     def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
         if dim == 2:
-            return min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least))
-        return min(max(lc, lowest), least)  # seams: the size from curvature vanishes at an apex
+            wanted = min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least))
+        else:  # seams: the size from curvature vanishes at an apex
+            wanted, tag = min(max(lc, lowest), least), 0
+        if tag in around:
+            places, most = around[tag]
+            away = np.sqrt(((places - (x, y, z)) ** 2).sum(axis=1))
+            wanted = min(wanted, float((most + GROWTH * away).min()))
+        return wanted
 
     mesh.setSizeCallback(size)
     try:
@@ -206,6 +234,37 @@ def _generate(model: Model, rows: Sequence[int], spacing: tuple[Float, ...], siz
         if before is not None:
             gmsh.api_callback_ = before
     return given
+
+
+def _around(model: Model, rows: Sequence[int], inner: Mapping[int, InnerPoints]) -> dict[int, tuple[Float, Float]]:
+    """Places and greatest sizes of the points inside, in the user's units, by face tag; of all faces by 0."""
+    out = {}
+    for r in rows:
+        if r in inner and len(inner[r].points):
+            out[model.faces[r].tag] = model.origin + model.scale * inner[r].points, model.scale * inner[r].size
+    if out:
+        places, sizes = zip(*out.values(), strict=True)
+        out[0] = np.concatenate(places), np.concatenate(sizes)
+    return out
+
+
+def _seeded(mesh: CurvedMesh, inner: InnerPoints | None) -> CurvedMesh:
+    """The mesh with the seeds among its vertices."""
+    if inner is None or not (inner.seed >= 0).any():
+        return mesh
+    own = inner.seed >= 0
+    fixed = mesh.vertex >= 0
+    fixed[mesh.segments] = True
+    points, triangles, rows = with_vertices(mesh.points, mesh.triangles, fixed, mesh.segments, inner.points[own])
+    more = len(points) - len(mesh.points)
+    seed = np.full(len(points), -1)
+    seed[rows] = inner.seed[own]
+    uv = np.concatenate([mesh.parameters, np.full((more, 2), np.nan)])
+    uv[rows] = np.nan
+    vertex = np.concatenate([mesh.vertex, np.full(more, -1)])
+    out = replace(mesh, points=points, parameters=uv, triangles=triangles, vertex=vertex, seed=seed)
+    _check(out)
+    return out
 
 
 def _limits(model: Model, rows: Sequence[int], sizes: Float) -> tuple[dict[int, float], dict[int, float]]:
@@ -235,6 +294,12 @@ def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) 
     uv = np.full((len(tags), 2), np.nan)
     if len(parameters) == 2 * len(coordinates) // 3:
         uv = np.asarray(parameters).reshape(-1, 2)[first]
+    # Gmsh counts embedded points neither among the nodes of the face nor among those of its boundary
+    inner = np.setdiff1d(np.array(face.embedded_points, np.int64) + 1, tags)
+    order = np.argsort(np.concatenate([tags, inner]))
+    tags = np.concatenate([tags, inner])[order]
+    points = np.concatenate([points, model.vertices[inner - 1]])[order]
+    uv = np.concatenate([uv, np.full((len(inner), 2), np.nan)])[order]
     used = np.unique(triangles)
     place = np.searchsorted(tags, used)
     if (tags[np.minimum(place, len(tags) - 1)] != used).any():

@@ -25,6 +25,7 @@ import numpy as np
 from ..errors import InputError
 from ..records import Model
 from .inside import curve_distance, height, inside
+from .seeds import on_curved
 from .session import gmsh_errors
 
 __all__ = ["prescribed_indices"]
@@ -189,14 +190,14 @@ def _stray(model: Model, tag: int, place: np.ndarray) -> tuple[str, str]:
         return f"only has the same place as point {twin}", f"give it to point {twin}"
     for row, face in enumerate(model.faces):
         local = face.local(place[None])
-        if abs(height(face, place[None])[0]) > NEAR:
+        if not face.curved and abs(height(face, place[None])[0]) > NEAR:
             continue
         distance, curve = curve_distance(model, row, local)
         if distance[0] <= NEAR:
             line = model.curves[curve[0]].tag
             split = f"Split Curve {{{line}}} Point {{{tag}}}; or BooleanFragments with OpenCASCADE"
             return f"lies on curve {line} without dividing it", f"divide the curve there ({split})"
-        if inside(model, row, local)[0]:
+        if inside(model, row, local)[0] if not face.curved else on_curved(model, row, place):
             return f"is not embedded in surface {face.tag}", f"write Point{{{tag}}} In Surface{{{face.tag}}};"
     return "is on none of the meshed surfaces", "take the index out of the name, or mesh the surface of the point"
 

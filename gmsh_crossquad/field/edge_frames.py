@@ -6,12 +6,13 @@ case and no global frame is needed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from ..records import CrossField, Float
+from ..records import Bool, CrossField, Float
 from .smooth import from_angles
 from .surface_mesh import SurfaceMesh
 
@@ -32,12 +33,24 @@ class EdgeFrames:
         Its vertices in the user's coordinates.
     normal : (e, 3) float64
         Unit normal of the face at every edge midpoint.
+    marked : (n,) bool, optional
+        Vertices that were made for singular points of the user; where it is left out, any inside may be one.
+    bending : callable, optional
+        Gives the bending of the face at every edge midpoint: symmetric (e, 3, 3) float64 that take a tangent vector to the
+        derivative of the unit normal, scaled by the face's extent; NaN where the CAD has none.
     """
 
     face: int
     surface: SurfaceMesh
     points: Float
     normal: Float
+    marked: Bool | None = None
+    bending: Callable[[], Float] | None = None
+
+    @property
+    def curved(self) -> bool:
+        """Whether the face is not known to be plane."""
+        return self.surface.points.shape[1] == 3
 
     @cached_property
     def places(self) -> Float:

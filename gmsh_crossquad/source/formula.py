@@ -12,6 +12,9 @@ a quarter of the whole one; for a point in one of the other quarters the formula
 at an interior vertex and goes back to the triangle at a boundary vertex, where it would be lost.)
 
 A point outside the face adds to the degree along the boundary loops only.
+
+A curved face has no such formula: there the field is the smoothest one with these singularities (`prescribed`), at vertices of
+the background mesh that were put there.
 """
 
 from __future__ import annotations
@@ -39,6 +42,9 @@ Complex = npt.NDArray[np.complex128]
 _TOUCH = 1e-9
 #: a point farther from a face's plane than this (times the extent of the face) is none of the face's
 _OFF_PLANE = 1e-6
+#: the same for a curved face; and the greatest sine of the angle between the way to its foot and the normal there
+_OFF_SURFACE = 0.02
+_FOOT = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,8 @@ class Singularities:
     ----------
     positions : (k, 2) or (k, 3) array_like
         In the user's coordinates.  With two coordinates, or a third one of NaN, a point is on the face whatever its height.
-        A point beside the plane of a face does not act on that face.
+        A point beside the plane of a face does not act on that face.  On a curved face three coordinates are needed; it takes
+        the points that are nearer to it than to other faces, and than a hundredth of its size.
     quarters : (k,) array_like of int
         Indices in quarter turns, of any sign and size.  Those of equal points add up.
 
@@ -91,15 +98,20 @@ class Singularities:
         return self.positions[np.sort(first)]
 
     def on(self, frames: EdgeFrames) -> CrossField:
-        """The field on a planar face, its rotation exact.
+        """The field on a face, its rotation exact.
 
         Raises
         ------
         FieldError
-            On a curved face, for a singularity on the boundary, and for one of two coordinates on a face that is upright.
+            For a singularity on the boundary, for one of two coordinates on a face that is upright or curved, and for indices on
+            a closed face that do not add up.
         """
         from ..field.smooth import wrap
 
+        if frames.curved:
+            from .prescribed import prescribed_field
+
+            return prescribed_field(frames.surface, self._at_vertices(frames), frames.face)
         plane = plane_of(frames, "a field of given singularities")
         near = extent(frames.points)
         point, quarters = self._on_plane(plane, near, frames.face)
@@ -118,6 +130,29 @@ class Singularities:
             _keep_from_boundary(mesh, vertices - a, turn, d, rotation)
         along = np.angle(frames.x @ plane.axes[0] + 1j * (frames.x @ plane.axes[1]))
         return CrossField(wrap(angle - along), rotation)
+
+    def _at_vertices(self, frames: EdgeFrames) -> Int:
+        """(n,) indices at the vertices of a curved face."""
+        mesh = frames.surface
+        marked = ~mesh.boundary_vertex if frames.marked is None else frames.marked
+        out = np.zeros(len(mesh.points), np.int64)
+        rows = np.flatnonzero(marked)
+        if not len(rows) or mesh.vertex_normal is None:
+            return out
+        size = extent(frames.points)
+        for place, quarters in zip(self.positions, self.quarters.tolist(), strict=True):
+            if np.isnan(place[2]):
+                remedy = "give three coordinates"
+                raise FieldError("a singularity has two coordinates on a curved face", entity=(2, frames.face), remedy=remedy)
+            off = place - frames.points[rows]
+            best = int(np.argmin(np.linalg.norm(off, axis=1)))
+            away = float(np.linalg.norm(off[best]))
+            # the vertex is the foot of the point
+            beside = float(np.linalg.norm(np.cross(off[best], mesh.vertex_normal[rows[best]])))
+            near = _FOOT * away + _OFF_PLANE * size if frames.marked is not None else np.inf
+            if away <= _OFF_SURFACE * size and beside <= near:
+                out[rows[best]] += quarters
+        return out
 
     def _on_plane(self, plane: Plane, size: float, face: int) -> tuple[Complex, Int]:
         """Complex coordinates and indices of the points that act on a face."""
