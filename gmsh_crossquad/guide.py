@@ -31,6 +31,8 @@ FEW = 4
 GROWTH = 3
 WORTH_REFINING = 0.02
 MOST_QUADS = 25_000
+DOUBLINGS = 3  # of the final edges on curves that turn too much
+LARGE = 6_000  # cells from which a grid is refined for folded cells only
 Evaluate = Callable[[int, Float], Float]
 
 
@@ -114,6 +116,8 @@ def smooth_guide(
             first = first or len(q.quads)
             if len(q.quads) > min(GROWTH * first, max(first, MOST_QUADS)):
                 break
+            if best is not None and not best[0][0] and len(q.quads) > LARGE:
+                break
             if len(q.quads) > MOST_QUADS:
                 raise TooManyCells(
                     f"the guide grid would have {len(q.quads)} cells, more than {MOST_QUADS}",
@@ -134,6 +138,8 @@ def smooth_guide(
             with watch.stage("fill"):
                 bad, folded = poor_cells(model, surfaces, guide, fine, evaluate, vertices)
                 steep = steep_chords(model, surfaces, guide, fine)
+                if not len(bad) and surfaces.curved.any():
+                    fine, steep = _divided(model, surfaces, guide, fine, steep, evaluate, vertices)
         score = (-len(folded), -len(steep), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
@@ -161,6 +167,21 @@ def smooth_guide(
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))
+
+
+def _divided(
+    model: Model, surfaces: Surfaces, guide: Guide, fine: Int, steep: Int, evaluate: Evaluate, vertices: Float
+) -> tuple[Int, Int]:
+    """Final edges per guide edge, doubled on steep chords as often as it helps, and the chords that stay steep."""
+    for _ in range(DOUBLINGS):
+        if not len(steep):
+            break
+        more = fine.copy()
+        more[steep] *= 2
+        if len(poor_cells(model, surfaces, guide, more, evaluate, vertices)[1]):
+            break
+        fine, steep = more, steep_chords(model, surfaces, guide, more)
+    return fine, steep
 
 
 def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:

@@ -162,7 +162,10 @@ def smooth(guide: Guide, model: Model, surfaces: Surfaces) -> tuple[Guide, Smoot
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
         candidate, used, valid = _untangle(start, ground, own, sides, ROUNDS if quality <= 0.0 else FEW_ROUNDS)
         rounds += used
-        candidate, score = _polish_all(candidate, ground, rest)
+        if valid or not ground.bent:
+            candidate, score = _polish_all(candidate, ground, rest)
+        else:
+            score = float(ground.quality(candidate).min())
         if score > quality or (valid and quality <= 0.0):
             best, quality, chosen = candidate, score, name
         if quality > (DOUBTFUL if name == order[0] else 0.0):
@@ -205,7 +208,7 @@ def _untangle(guide: Guide, ground: _Ground, rest: RestLengths, sides: Float, mo
     least = float(grid.areas(z, sides).min())
     rounds, eps = 0, np.inf
     bent = ground.bent
-    while least <= LEAST_AREA and rounds < (2 * most if bent else most) and grid.size:
+    while least <= LEAST_AREA and rounds < most and grid.size:
         eps = max(LEAST_EPS, min(0.5 * eps, float(np.sqrt(1e-6 + 0.04 * least * least))))
         z = minimise(
             partial(grid.value, sides=sides, eps=eps, power=1),
