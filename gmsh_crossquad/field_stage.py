@@ -12,6 +12,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from .cad.bending import edge_bending
 from .cad.indices import prescribed_indices
 from .cad.seeds import face_seeds
 from .errors import FieldError, GeometryError, LayoutError, MeshError
@@ -128,7 +129,7 @@ def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
     normal = np.broadcast_to(face.normal, (len(surface.edges), 3)) if own is None else own
     points = model.origin + model.scale * face.world(mesh.points)
     marked = (mesh.seed >= 0) | ((mesh.vertex >= 0) & ~surface.boundary_vertex)
-    return EdgeFrames(face.tag, surface, points, normal, marked)
+    return EdgeFrames(face.tag, surface, points, normal, marked, lambda: edge_bending(model, mesh))
 
 
 def field_of_face(

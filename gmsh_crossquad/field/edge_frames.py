@@ -36,8 +36,9 @@ class EdgeFrames:
     marked : (n,) bool, optional
         Vertices that were made for singular points of the user; where it is left out, any inside may be one.
     bending : callable, optional
-        Gives the bending of the face at every edge midpoint: symmetric (e, 3, 3) float64 that take a tangent vector to the
-        derivative of the unit normal, scaled by the face's extent; NaN where the CAD has none.
+        Gives how the face bends at every edge midpoint, from the CAD: (e, 3) float64, the components xx, yy and xy in the frame
+        of the edge of the tensor that takes a tangent vector to the derivative of the unit normal, times the face's extent; NaN
+        where the CAD has none.
     """
 
     face: int

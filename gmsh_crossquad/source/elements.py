@@ -1,4 +1,4 @@
-"""Quadratic finite elements on plane triangles: six nodes each, the vertices and the edge midpoints."""
+"""Quadratic finite elements on triangles, plane or laid into the plane one by one: six nodes each, vertices and edge middles."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from ..field.surface_mesh import SurfaceMesh
 from ..records import Float, Int
+from .power import Complex
 
 __all__ = ["QuadraticElements"]
 
@@ -19,14 +20,16 @@ class QuadraticElements:
     ----------
     mesh : SurfaceMesh
         For its topology.
-    points : (n, 2) float64
+    points : (n, 2) or (m, 3, 2) float64
+        Vertices of a plane mesh; or, on a curved surface, the corners of every triangle, each in a plane of its own
+        (`SurfaceMesh.layout`): all that counts is lengths and angles.
     """
 
     def __init__(self, mesh: SurfaceMesh, points: Float) -> None:
         self.mesh = mesh
-        self.size = len(points) + len(mesh.edges)
-        self.nodes: Int = np.concatenate([mesh.triangles, len(points) + mesh.triangle_edges], axis=1)
-        p = points[mesh.triangles]
+        self.size = len(mesh.points) + len(mesh.edges)
+        self.nodes: Int = np.concatenate([mesh.triangles, len(mesh.points) + mesh.triangle_edges], axis=1)
+        p = points[mesh.triangles] if points.ndim == 2 else points
         opposite = np.roll(p, -2, axis=1) - np.roll(p, -1, axis=1)
         self.double_area: Float = opposite[:, 0, 0] * opposite[:, 1, 1] - opposite[:, 0, 1] * opposite[:, 1, 0]
         # gradients of the barycentric coordinates: the opposite edge, turned counter-clockwise, over twice the area
@@ -57,6 +60,15 @@ class QuadraticElements:
         edge = self.mesh.triangle_edges.ravel()
         total = np.stack([np.bincount(edge, own[:, :, d].ravel()) for d in range(2)], axis=1)
         out: Float = total / np.bincount(edge, np.repeat(self.double_area, 3))[:, None]
+        return out
+
+    def edge_slopes(self, values: Float) -> Complex:
+        """(e,) the same on a curved surface, each in the frame of its edge as a complex number."""
+        own = np.einsum("tkdi,ti->tkd", self._slopes, values[self.nodes]) @ np.array([1.0, 1.0j])
+        own = own * np.exp(-1j * self.mesh.edge_direction) * self.double_area[:, None]
+        edge = self.mesh.triangle_edges.ravel()
+        total = np.bincount(edge, own.real.ravel()) + 1j * np.bincount(edge, own.imag.ravel())
+        out: Complex = (total / np.bincount(edge, np.repeat(self.double_area, 3))).astype(np.complex128)
         return out
 
     def _assembled(self, local: Float) -> Any:

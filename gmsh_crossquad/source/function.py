@@ -18,7 +18,7 @@ from .values import checked_values
 if TYPE_CHECKING:
     from ..field.edge_frames import EdgeFrames
 
-__all__ = ["Function", "load_function"]
+__all__ = ["Function", "function_values", "load_function"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,9 @@ class Function:
         unit length or tangent to the face, or (n,) angles in radians (from the x axis; on a plane other than xy from the
         projected x axis, about the normal whose last coordinate is positive).
 
-    A single place without direction (zero, normal to the face) is filled from its neighbours.
+    Directions are projected on the tangent plane of the face.  On a curved face angles are measured from its frame (see `frame`),
+    the smoothest directions without zeros, about its normal.  A single place without direction (zero, normal to the face) is
+    filled from its neighbours.
     """
 
     function: Callable[[Float], Any]
@@ -52,33 +54,49 @@ class Function:
         """
         from ..field.smooth import from_angles
         from .checks import check_turns, fill_gaps
+        from .frame import frame_angles
         from .plane import angle_arms
         from .power import unit_power
 
-        places = frames.places.copy()
-        try:
-            found = self.function(places)
-        except CrossQuadError:
-            raise
-        except Exception as error:
-            raise _failed("the function of the field", error, entity=(2, frames.face)) from error
-        try:
-            angles = np.ndim(found) == 1 or np.shape(found) == (len(places), 1)
-        except ValueError:  # rows of different length
-            angles = False
-        values = checked_values(found, "angle" if angles else "direction", len(places))
-        bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
-        if len(bad):
-            raise FieldError(
-                f"the function of the field gives {len(bad)} values that are no finite numbers, first",
-                entity=(2, frames.face),
-                location=frames.places[bad[0]].tolist(),
-                remedy="give a direction everywhere",
-            )
+        values = function_values(self.function, frames)
+        angles = values.ndim == 1
+        if angles and frames.curved:
+            return check_turns(frames, from_angles(frames.surface, frame_angles(frames) + values))
         arms = angle_arms(frames, values)[:, None] if angles else values
         power, defined = unit_power(arms, frames.x, frames.y, float(np.abs(arms).max()))
         theta = fill_gaps(frames, 0.25 * np.angle(power), defined)
         return check_turns(frames, from_angles(frames.surface, theta))
+
+
+def function_values(function: Callable[[Float], Any], frames: EdgeFrames) -> Float:
+    """What a function gives at the edge midpoints of a face: angles (e,), or directions (e, 1, 3).
+
+    Raises
+    ------
+    FieldError
+        If the function fails or gives values of the wrong shape or that are not finite.
+    """
+    places = frames.places.copy()
+    try:
+        found = function(places)
+    except CrossQuadError:
+        raise
+    except Exception as error:
+        raise _failed("the function of the field", error, entity=(2, frames.face)) from error
+    try:
+        angles = np.ndim(found) == 1 or np.shape(found) == (len(places), 1)
+    except ValueError:  # rows of different length
+        angles = False
+    values = checked_values(found, "angle" if angles else "direction", len(places))
+    bad = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    if len(bad):
+        raise FieldError(
+            f"the function of the field gives {len(bad)} values that are no finite numbers, first",
+            entity=(2, frames.face),
+            location=frames.places[bad[0]].tolist(),
+            remedy="give a direction everywhere",
+        )
+    return values
 
 
 def load_function(name: str) -> Any:

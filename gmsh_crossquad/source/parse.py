@@ -3,6 +3,8 @@
     smooth                              the default; smooth:0.02 with the core size epsilon
     singularities:(-0.4,0):1,(0.4,0):1  points (2 or 3 coordinates) and their indices in quarter turns
     eigenmode:4                         4th eigenfunction; eigenmode:4:neumann, eigenmode:4:isolines
+    curvature                           principal directions of curved faces
+    heat-frame                          frame of the vector heat method; heat-frame:module:function with angles to it
     stress.vtu:principal                a file (.vtu, .vtk, .msh) and its array (see `files`) or view
     view:2                              a Gmsh view of the session, by tag or by name
     module:function                     a Python function
@@ -29,8 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["FieldText", "parse_field", "parse_text"]
 
 FORMS = (
-    "write smooth, singularities:(x,y):q,..., eigenmode:k, file.vtu:array, file.msh:view, view:name or module:function, "
-    "or 1=...;2=... by surface"
+    "write smooth, singularities:(x,y):q,..., eigenmode:k, curvature, heat-frame, file.vtu:array, file.msh:view, view:name or "
+    "module:function, or 1=...;2=... by surface"
 )
 FILES = (".vtu", ".vtk", ".msh")
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -46,7 +48,7 @@ class FieldText:
 
     Attributes
     ----------
-    kind : {"smooth", "singularities", "eigenmode", "file", "view", "function"}
+    kind : {"smooth", "singularities", "eigenmode", "curvature", "heat-frame", "file", "view", "function"}
     arguments : tuple
     """
 
@@ -78,7 +80,7 @@ def parse_text(text: str) -> dict[int | None, FieldText]:
 def _single(text: str) -> FieldText:
     """One source."""
     word, _, rest = text.partition(":")
-    made = {"smooth": _smooth, "singularities": _singularities, "eigenmode": _eigenmode, "view": _view}.get(word.strip().lower())
+    made = MADE.get(word.strip().lower())
     if made:
         return made(rest, text)
     file = FILE.fullmatch(text)
@@ -128,6 +130,28 @@ def _view(rest: str, text: str) -> FieldText:
     if not name:
         raise InputError(f"the view {text!r} has no tag", remedy="write view:2, or view:name")
     return FieldText("view", (int(name) if name.isdecimal() else name,))
+
+
+def _curvature(rest: str, text: str) -> FieldText:
+    if rest:
+        raise InputError(f"the field {text!r} is none", remedy="write curvature alone")
+    return FieldText("curvature", ())
+
+
+def _heat_frame(rest: str, text: str) -> FieldText:
+    if rest and not PATH.fullmatch(rest.strip()):
+        raise InputError(f"the field {text!r} is none", remedy="write heat-frame, or heat-frame:module:function")
+    return FieldText("heat-frame", (rest.strip() or None,))
+
+
+MADE = {
+    "smooth": _smooth,
+    "singularities": _singularities,
+    "eigenmode": _eigenmode,
+    "curvature": _curvature,
+    "heat-frame": _heat_frame,
+    "view": _view,
+}
 
 
 def parse_field(
@@ -194,6 +218,16 @@ def _made(
         from .eigenmode import Eigenmode
 
         return Eigenmode(*text.arguments)
+    if text.kind == "curvature":
+        from .curvature import Curvature
+
+        return Curvature()
+    if text.kind == "heat-frame":
+        from .function import load_function
+        from .heat_frame import HeatFrame
+
+        (function,) = text.arguments
+        return HeatFrame() if function is None else HeatFrame(load_function(function))
     if text.kind == "view":
         return load_view(*text.arguments)
     if text.kind == "function":

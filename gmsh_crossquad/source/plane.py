@@ -89,7 +89,7 @@ def plane_of(frames: EdgeFrames, what: str) -> Plane:
         flat = np.abs(plane.height(frames.points)).max() <= _FLAT * extent(frames.points)
         if flat and np.abs(frames.normal - plane.normal).max() <= _FLAT:
             return plane
-    raise FieldError(f"{what} needs a planar face", entity=(2, frames.face), remedy="use another cross field on curved faces")
+    raise FieldError(f"{what} needs a planar face", entity=(2, frames.face), remedy="give directions on curved faces")
 
 
 def angle_arms(frames: EdgeFrames, angle: Float) -> Float:

@@ -2,8 +2,9 @@
 
 A value becomes an arm of the cross in space.  In the tangent frame of a mesh triangle an arm of angle a is the complex number
 exp(4 i a), which is the same for all four arms; between the corners it is interpolated linearly, and the arm that it stands for
-is projected on the tangent plane of the face.  Two arms are added in this form.  A symmetric tensor is interpolated as it is: its
-deviator in the frame, ``(T_xx - T_yy)/2 + i T_xy``, has twice the angle of the principal directions.
+is projected on the tangent plane of the face.  On a mesh that is bent, arms are projected on the tangent planes of the corners
+first, so that a part of them that is normal to the surface does not count.  Two arms are added in this form.  A symmetric tensor
+is interpolated as it is: its deviator in the frame, ``(T_xx - T_yy)/2 + i T_xy``, has twice the angle of its principal axes.
 
 Values on cells are averaged to the points first, weighted by area: the field is then continuous, and it does not matter on
 which side of an edge a midpoint is taken to be.
@@ -40,6 +41,9 @@ if TYPE_CHECKING:
 __all__ = ["Samples"]
 
 Complex = npt.NDArray[np.complex128]
+
+#: least cosine between the normals of a node and of its triangle where there is no crease
+_SMOOTH = 0.85
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,10 +184,36 @@ class Samples:
             b = np.einsum("ui,ukij,uj->uk", y, own, y)
             value = 0.5 * (a - b) + 1j * np.einsum("ui,ukij,uj->uk", x, own, y)
             return x, y, value, np.abs(value) > ZERO * largest
+        if self._bent:
+            normal = self._corner_normals(used)[:, :, None]
+            own = own - np.sum(own * normal, axis=3, keepdims=True) * normal
         value, defined = unit_power(own, x[:, None], y[:, None], largest)
         mean = np.where(defined, value, 0.0).sum(axis=1)
         mean /= np.maximum(np.abs(mean), CANCELLED)
         return x, y, np.where(defined, value, mean[:, None]), defined
+
+    @cached_property
+    def _bent(self) -> bool:
+        """Whether the mesh is not plane."""
+        return bool(np.abs(self.locator.normal @ self.locator.normal[0]).min() < 1.0 - 1e-12)
+
+    @cached_property
+    def _node_normals(self) -> Float:
+        """(nodes, 3) normals at the nodes: every corner between edges a and b counts with a x b / (|a|^2 |b|^2)."""
+        p = self.positions[self.triangles]
+        edge = np.roll(p, -1, axis=1) - p
+        square = np.sum(edge**2, axis=2, keepdims=True)
+        corner = np.cross(edge, -np.roll(edge, 1, axis=1)) / (square * np.roll(square, 1, axis=1))
+        node, count = self._node[self.triangles].ravel(), self._node.max() + 1
+        return np.stack([np.bincount(node, c, count) for c in corner.reshape(-1, 3).T], axis=1)
+
+    def _corner_normals(self, used: Int) -> Float:
+        """(u, 3, 3) unit normals at the corners of triangles: those of the nodes, at creases those of the triangles."""
+        own = np.repeat(self.locator.normal[used][:, None], 3, axis=1)
+        normal = self._node_normals[self._node[self.triangles[used]]]
+        length = np.linalg.norm(normal, axis=2, keepdims=True)
+        smooth = np.sum(normal * own, axis=2, keepdims=True) > _SMOOTH * length
+        return np.where(smooth & (length > 0.0), normal / np.where(length > 0.0, length, 1.0), own)
 
     def _check_cover(self, frames: EdgeFrames, found: Places) -> None:
         missed = found.triangle < 0

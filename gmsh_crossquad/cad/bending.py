@@ -1,0 +1,56 @@
+"""How a curved CAD face bends at the edges of its background mesh: the derivative of its unit normal.
+
+That of the points of the mesh comes from the CAD (`surface_samples`); at a point without parameters or at a pole it is that of
+the nearest sample.  An edge has the mean of its ends, each seen in the frame that has the edge's direction there (on a sphere
+that is exact, elsewhere of second order).
+
+`gmsh.model.getPrincipalCurvatures` is not used: for surfaces of the built-in kernel it gives wrong values (Gmsh 4.15.2).
+"""
+
+from __future__ import annotations
+
+import gmsh
+import numpy as np
+
+from ..field.surface_mesh import SurfaceMesh
+from ..records import FaceMesh, Float, Model
+from .charts import Charts
+from .session import gmsh_errors
+from .surface_samples import surface_samples
+
+__all__ = ["edge_bending"]
+
+
+def edge_bending(model: Model, mesh: FaceMesh) -> Float:
+    """The bending of a curved face at the edge midpoints of its background mesh.
+
+    Parameters
+    ----------
+    model : Model
+        Of the current Gmsh model.
+    mesh : FaceMesh
+
+    Returns
+    -------
+    (e, 3) float64
+        Components xx, yy and xy of the symmetric tensors that take a tangent vector to the derivative of the unit normal, x
+        along the edge from its lower to its higher vertex, y to the left of it; times the face's extent.  NaN on a face without
+        a parametrization.
+    """
+    face = model.faces[mesh.face]
+    edges = SurfaceMesh(mesh.points, mesh.triangles).edges
+    with gmsh_errors("reading the kind of the surface", entity=(2, face.tag)):
+        discrete = gmsh.model.getType(2, face.tag).startswith("Discrete")
+    if discrete or not np.isfinite(mesh.parameters).all(axis=1).any():
+        return np.full((len(edges), 3), np.nan)
+    own = np.arange(len(model.faces)) == mesh.face
+    charts = Charts.read(np.array([f.tag for f in model.faces]), own, model.scale)
+    samples = surface_samples(model, (mesh,), charts)
+    near = samples.nearest(np.full(len(mesh.points), mesh.face), mesh.points, 1, True)[:, 0]
+    turning, normal = samples.turning[near][edges], samples.normals[near][edges]
+    along = (mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]])[:, None]
+    x = along - np.einsum("eic,eic->ei", along.repeat(2, axis=1), normal)[..., None] * normal
+    x /= np.linalg.norm(x, axis=2)[..., None]
+    y = np.cross(normal, x)
+    parts = [np.einsum("eic,eicd,eid->e", a, turning, b) for a, b in ((x, x), (y, y), (x, y))]
+    return 0.5 * face.extent * np.stack(parts, axis=1)

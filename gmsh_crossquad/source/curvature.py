@@ -1,0 +1,81 @@
+"""The cross field of the principal directions of curvature.
+
+The bending of the face (the derivative of its unit normal, from the CAD) is a symmetric tensor in the tangent plane; in the frame
+of an edge its deviator ``(W_xx - W_yy)/2 + i W_xy`` has twice the angle of the principal directions, and half the difference of
+the principal curvatures as its length.
+
+Where that difference is less than a hundredth of the greatest curvature of the face, all directions are principal (umbilic
+points, parts of spheres and planes).  There the crosses ``z = exp(4 i theta)`` are filled in smoothly: they are harmonic for the
+connection Laplacian (`connection`), between the places where the directions are known and the boundary, which they are aligned
+with.  A face that is umbilic everywhere has the default smooth field.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import FieldError
+from ..field.connection import ConnectionOperators
+from ..field.operators import FieldOperators, factor
+from ..field.smooth import from_angles
+from ..field.surface_mesh import SurfaceMesh
+from ..records import Bool, CrossField, Float
+from .checks import check_turns
+
+if TYPE_CHECKING:
+    from ..field.edge_frames import EdgeFrames
+
+__all__ = ["Curvature"]
+
+#: difference of the principal curvatures over the greatest curvature of the face, below which a point is umbilic
+_UMBILIC = 0.01
+#: curvature, over the reciprocal of the face's extent, below which a face is plane
+_PLANE = 1e-3
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """The principal directions of every face."""
+
+    def points(self) -> Float:
+        """None: (0, 3)."""
+        return np.zeros((0, 3))
+
+    def on(self, frames: EdgeFrames) -> CrossField | None:
+        """The field on one face; None (the smooth field) where all its points are umbilic.
+
+        Raises
+        ------
+        FieldError
+            On a face whose CAD gives no curvature, and where the background triangles are too coarse for the directions.
+        """
+        if not frames.curved:
+            return None
+        mesh = frames.surface
+        bending = None if frames.bending is None else frames.bending()
+        if bending is None or not np.isfinite(bending).all():
+            what = "a surface without a parametrization has no principal directions"
+            raise FieldError(what, entity=(2, frames.face), remedy="use another cross field there")
+        xx, yy, xy = bending.T
+        deviator = 0.5 * (xx - yy) + 1j * xy
+        greatest = float((np.abs(0.5 * (xx + yy)) + np.abs(deviator)).max())
+        known = 2.0 * np.abs(deviator) > _UMBILIC * greatest
+        if greatest < _PLANE or not np.any(known):
+            return None
+        theta = 0.5 * np.angle(deviator)
+        if not np.all(known):
+            theta = _filled(mesh, np.where(known, theta, 0.0), known | mesh.boundary_edge)
+        return check_turns(frames, from_angles(mesh, theta))
+
+
+def _filled(mesh: SurfaceMesh, theta: Float, known: Bool) -> Float:
+    """Angles (e,) that are harmonic between the known ones."""
+    stiffness = ConnectionOperators(FieldOperators(mesh)).stiffness
+    z = np.stack([np.cos(4 * theta), np.sin(4 * theta)], axis=1)
+    free, given = (np.flatnonzero(np.repeat(mask, 2)) for mask in (~known, known))
+    right = -(stiffness[free][:, given] @ z.ravel()[given])
+    z.ravel()[free] = factor(stiffness[free][:, free].tocsc()).solve(right)
+    return np.where(known, theta, 0.25 * np.arctan2(z[:, 1], z[:, 0]))
