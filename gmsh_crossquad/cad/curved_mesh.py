@@ -23,6 +23,7 @@ from . import session
 from .curved_seeds import with_vertices
 from .sample import evaluate
 from .seeds import GROWTH, InnerPoints
+from .space_size import SpaceSize
 
 __all__ = ["CurvedMesh", "triangulate_curved"]
 
@@ -39,7 +40,7 @@ OPTIONS: dict[str, float] = {
     "Mesh.MaxNumThreads2D": 1,
     "Mesh.MeshOnlyEmpty": 1,
     "Mesh.MeshOnlyVisible": 1,
-    "Mesh.MeshSizeExtendFromBoundary": 1,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
     "Mesh.MeshSizeFactor": 1,
     "Mesh.MeshSizeFromCurvature": PER_TURN,
     "Mesh.MeshSizeFromParametricPoints": 0,
@@ -211,12 +212,14 @@ def _generate(
             element += len(ends)
     limit, floor = _limits(model, rows, sizes)
     least, lowest = min(limit.values()), min(floor.values())
-    around = _around(model, rows, inner)
+    near = _curve_sizes(model, sorted(used), spacing)
     before = getattr(gmsh, "api_callback_", None)
+
+    around = _around(model, rows, inner)
 
     def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
         if dim == 2:
-            wanted = min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least))
+            wanted = near(x, y, z, min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least)))
         else:  # seams: the size from curvature vanishes at an apex
             wanted, tag = min(max(lc, lowest), least), 0
         if tag in around:
@@ -265,6 +268,16 @@ def _seeded(mesh: CurvedMesh, inner: InnerPoints | None) -> CurvedMesh:
     out = replace(mesh, points=points, parameters=uv, triangles=triangles, vertex=vertex, seed=seed)
     _check(out)
     return out
+
+
+def _curve_sizes(model: Model, rows: Sequence[int], spacing: tuple[Float, ...]) -> SpaceSize:
+    """Sizes that the nodes on the curves `rows` ask for, in the user's units."""
+    points, sizes = [np.zeros((0, 3))], [np.zeros(0)]
+    for c in rows:
+        step = np.diff(spacing[c]) * model.scale
+        points.append(model.curves[c].at(spacing[c]) * model.scale + model.origin)
+        sizes.append(0.5 * (np.concatenate([step[:1], step]) + np.concatenate([step, step[-1:]])))
+    return SpaceSize(np.concatenate(points), np.concatenate(sizes))
 
 
 def _limits(model: Model, rows: Sequence[int], sizes: Float) -> tuple[dict[int, float], dict[int, float]]:
