@@ -183,10 +183,12 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
             except Indivisible as error:
                 if wanted.given and attempt.rule != "divisible":  # first each face alone
                     raise
-                hopeless.add(key)
-                with watch.stage("repair"):
-                    repaired = faces[key].together(model, error)
-                hopeless.discard(key)
+                try:
+                    with watch.stage("repair"):
+                        repaired = faces[key].together(model, error)
+                except Indivisible:
+                    hopeless.add(key)
+                    raise
                 if repaired is None:
                     raise
                 faces[key] = repaired

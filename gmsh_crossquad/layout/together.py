@@ -8,8 +8,8 @@ numbers to vanish.  What is missing is found by a linear program with a mismatch
 under the lower bounds and the separation cuts that were met.  All its rows but the bounds are homogeneous, so that a mismatch of
 0 means that there are integer divisions, too (a multiple of the solution).  Else a patch with a mismatch needs a dislocation: a
 pair of singularities of +1/4 and -1/4.  Around the pair the cross field has turned by nothing, but a path around it on the grid
-does not close, by a vector that is perpendicular to the line from one to the other (the sides of the grid on which the +1/4
-lies has more edges than the opposite one).  So the +1/4 goes towards the longer side.
+does not close, by a vector that is perpendicular to the line from one to the other: the side towards the +1/4 has more edges
+than the opposite one.  So the +1/4 goes towards the longer side.
 
 The weights w_p prefer patches with room.  Faces with a new pair are aligned and traced again; where the layout still has no
 divisions but less mismatch the next pairs are added to it, else the patches that were used get a greater weight.
@@ -22,21 +22,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.optimize import linprog
 
 from ..errors import LayoutError
 from ..field.repair import with_pairs
-from ..records import AlignedField, FaceMesh, FaceTMesh, Float, Int, Model, TMesh
+from ..records import AlignedField, FaceMesh, FaceTMesh, Float, Model, TMesh
 from .conditions import at_least, balance
 from .cuts import Cut
 from .face_tmesh import trace_face
 from .glue import glue
+from .integer_program import IntegerProgram
 from .quantize import Indivisible, quantize
 
 __all__ = ["Together", "divisible_together", "mismatch"]
 
 MOST_TRIALS = 12
+MOST_LISTED = 4
+#: factor on the weights of patches where a pair did not help
 FAILED = 4.0
+#: cost of a division over the least of a mismatch, which makes the solution less arbitrary
+SMALL = 1e-6
 LEAST = 1e-6
 #: half the distance of a pair, over the side of the patch along it, and over the shorter side
 REACH = 0.25
@@ -78,25 +82,24 @@ def mismatch(model: Model, tmesh: TMesh, cuts: Sequence[Cut], weight: Float) -> 
 def _program(tmesh: TMesh, cuts: Sequence[Cut], weight: Float) -> Float:
     sums = balance(tmesh)
     rows, n = sums.shape
+    cost = np.concatenate([np.full(n, SMALL * weight.min(initial=1.0)), np.repeat(weight, 4)])
+    program = IntegerProgram(np.zeros(0), np.zeros(0))
+    program.add_columns(cost, np.full(len(cost), np.inf), integral=False)
+    slack = sp.kron(sp.eye_array(rows), np.array([[-1.0, 1.0]]))
+    matrix = sp.hstack([sums, slack], format="csr")
+    start, column = matrix.indptr[:-1].astype(np.int64), matrix.indices.astype(np.int64)
+    program.add_rows(np.zeros(rows), np.zeros(rows), start, column, matrix.data)
     options = [cut.options[0] for cut in cuts]
-    row = [i for i, (terms, _) in enumerate(options) for _ in terms]
-    column = [arc for terms, _ in options for arc, _ in terms]
-    value = [float(c) for terms, _ in options for _, c in terms]
-    least = sp.csr_array((value, (row, column)), shape=(len(options), n))
-    none = sp.csr_array((len(options), 2 * rows))
-    eye = sp.eye_array(rows, format="csr")
-    found = linprog(
-        np.concatenate([np.full(n, 1e-6 * weight.min(initial=1.0)), np.tile(np.repeat(weight, 2), 2)]),
-        A_ub=sp.hstack([-least, none], format="csr"),
-        b_ub=-np.array([float(bound) for _, bound in options]),
-        A_eq=sp.hstack([sums, -eye, eye], format="csr"),
-        b_eq=np.zeros(rows),
-        method="highs",
-    )
-    if found.status != 0:
-        raise LayoutError("the divisions of the layout could not be judged", remedy="another size may help")
-    slack = found.x[n : n + rows] - found.x[n + rows :]
-    return np.where(np.abs(slack) > LEAST, slack, 0.0).reshape(-1, 2)
+    terms = [term for expression, _ in options for term in expression]
+    start = np.cumsum([0, *(len(expression) for expression, _ in options)])[:-1]
+    column, value = (np.array([term[i] for term in terms], np.int64) for i in (0, 1))
+    least = np.array([float(bound) for _, bound in options])
+    program.add_rows(least, np.full(len(least), np.inf), start, column, value.astype(float))
+    found = program.relaxation()
+    if found is None:
+        raise LayoutError("the divisions of the layout could not be judged", remedy="report the model")
+    s = found[0][n::2] - found[0][n + 1 :: 2]
+    return np.where(np.abs(s) > LEAST, s, 0.0).reshape(-1, 2)
 
 
 def divisible_together(
@@ -147,9 +150,9 @@ def divisible_together(
         missing = mismatch(model, glued, known, weight)
     tags = sorted({model.faces[f].tag for f in glued.patch_face[np.any(missing, axis=1)].tolist()})
     raise Indivisible(
-        "the layouts of the faces have no integer divisions together",
+        f"no divisions of the layout ({len(glued.patches)} patches) keep all corners and singularities apart",
         entity=(2, tags[0]),
-        remedy="change the singularities or boundary indices of the surfaces " + ", ".join(map(str, tags)),
+        remedy=f"change the singularities or boundary indices of surface {' or '.join(map(str, tags[:MOST_LISTED]))}",
     )
 
 
@@ -176,9 +179,7 @@ def _weights(tmesh: TMesh) -> Float:
     return out
 
 
-def _with_pairs(
-    model: Model, meshes: Sequence[FaceMesh], now: Together, tmesh: TMesh, missing: Float
-) -> Together | None:
+def _with_pairs(model: Model, meshes: Sequence[FaceMesh], now: Together, tmesh: TMesh, missing: Float) -> Together | None:
     """A pair more in every patch with a mismatch; None where it does not fit in or the face cannot be traced."""
     fields, tmeshes, pairs = list(now.fields), list(now.tmeshes), dict(now.pairs)
     patches = np.flatnonzero(np.any(missing, axis=1))
