@@ -118,7 +118,7 @@ class _Ground(NamedTuple):
         return bool(self.surfaces.curved.any())
 
     def quality(self, guide: Guide) -> Float:
-        return guide_quality(guide, self.surfaces)
+        return guide_quality(guide, self.surfaces, self.model)
 
     def rest(self, guide: Guide, actual: float = 0.0, graded: bool = True) -> RestLengths:
         return rest_lengths(guide, self.model, self.surfaces, self.table, actual=actual, graded=graded)
