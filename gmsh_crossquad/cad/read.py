@@ -18,6 +18,7 @@ from ..records import Curve, Face, Float, Model
 from .curved_face import curved_face, seams
 from .knots import untie
 from .loops import boundary_loops
+from .periodic import linked
 from .plane import face_plane
 from .sample import refine, sample
 from .session import gmsh_errors
@@ -145,10 +146,18 @@ def read_model(options: MeshOptions) -> Model:
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
         faces=tuple(faces),
-        notes=tuple(f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied),
+        notes=_notes(kept),
         point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
     )
+
+
+def _notes(kept: list[_Raw]) -> tuple[str, ...]:
+    """What the user should know about the model."""
+    notes = [f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied]
+    if linked():
+        notes.append("the mesh is not periodic; periodic links of the model are taken off")
+    return tuple(notes)
 
 
 def _group_names(dim: int) -> dict[int, list[str]]:
