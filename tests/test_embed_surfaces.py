@@ -200,7 +200,7 @@ def test_laplace_start_on_a_surface(name: str) -> None:
 
 
 def test_quality_sees_quads_turned_over_on_a_sphere() -> None:
-    guide, _, surfaces = GRIDS["cube"]
+    guide, model, surfaces = GRIDS["cube"]
     quality = guide_quality(guide, surfaces, model)
     assert quality.min() > 0.8
     assert guide_quality(replace(guide, quads=guide.quads[:, ::-1]), surfaces, model).max() < -0.8

@@ -5,11 +5,11 @@ The coordinates z are relative to the local rest length l, so that small feature
     interior vertex    x = x0 + l (z_1 b_1 + z_2 b_2)        b: axes of its plane face, or of the tangent plane of a curved one,
     vertex on a curve  s = s0 + l z,   x = C(s)              in all its faces at once.
 
-The energy is that of the corners (`energy`), but those in cusps, and of the edges on curves (`chain_energy`).  A quad's corners are seen in a
-frame (o, a): that of its plane face, or on a curved face the tangent plane of the surface at the quad's middle.  A vertex seen
-in a frame is a *node*, with the plane coordinates y = a (x - o) and, on a curved face, dy/dz = l a b^T.  All frames are frozen;
-`positions` puts the vertices back on their surfaces.  The Hessian is positive definite: it drops the curvature of curves
-and surfaces, and what the two modules drop.
+The energy is that of the corners (`energy`), but those in cusps, and of the edges on curves (`chain_energy`).  A quad's
+corners are seen in a frame (o, a): that of its plane face, or on a curved face the tangent plane of the surface at the quad's
+middle.  A vertex seen in a frame is a *node*, with the plane coordinates y = a (x - o) and, on a curved face, dy/dz = l a b^T.
+All frames are frozen; `positions` puts the vertices back on their surfaces.  The Hessian is positive definite: it drops the
+curvature of curves and surfaces, and what the two modules drop.
 """
 
 from __future__ import annotations
