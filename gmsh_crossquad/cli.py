@@ -76,8 +76,9 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--field",
             metavar="SOURCE",
-            help="cross field: smooth (default), singularities:(X,Y):Q,..., eigenmode:K, FILE[:ARRAY], MODULE:FUNCTION, view:TAG "
-            "(or 1=SOURCE;2=SOURCE, by surface)",
+            help="cross field: smooth (default), singularities:(X,Y[,Z]):Q,..., eigenmode:K, curvature (principal directions), "
+            "heat-frame (frame of the vector heat method; heat-frame:MODULE:FUNCTION for angles to it), FILE[:ARRAY], "
+            "MODULE:FUNCTION, view:TAG (or 1=SOURCE;2=SOURCE, by surface)",
         )
         command.add_argument(
             "--index",

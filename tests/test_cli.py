@@ -1,5 +1,6 @@
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 import gmsh_crossquad as cq
 import gmsh_crossquad.api  # loaded once here, not in every child process
 from gmsh_crossquad import child, cli, formats, progress
+from gmsh_crossquad.arguments import parse_extrusion
 
 ROOT = Path(__file__).resolve().parent.parent
 SQUARE = """
@@ -289,6 +291,7 @@ def readme_commands():
 
 def test_readme_names_the_commands_that_the_checks_run():
     install, test, check, *fields = readme_commands()
+    fields = fields[:3]
     script = [line.strip() for line in (ROOT / ".ci" / "run").read_text().splitlines()]
     assert install.split(" && ")[-1] in script
     assert test.split(" && ")[-1] in script
@@ -296,6 +299,24 @@ def test_readme_names_the_commands_that_the_checks_run():
     assert check in script
     assert len(fields) == 3 and all(line in script for line in fields)
     assert install.split(" && ")[-1].startswith("gmsh-crossquad mesh ")
+
+
+def test_readme_commands_are_understood():
+    for line in readme_commands():
+        program, *arguments = shlex.split(line.split(" && ")[-1])
+        if program == "gmsh-crossquad":
+            given = cli._parser().parse_args(arguments)
+            model = given.model or given.mesh
+            assert not model.startswith("geo/") or (ROOT / model).is_file(), line
+            if getattr(given, "extrude", None):
+                parse_extrusion(given.extrude)
+
+
+def test_readme_solid_is_filled(tmp_path):
+    code = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S)
+    subprocess.run([sys.executable, "-c", code[1]], check=True, cwd=tmp_path, capture_output=True)
+    kinds = meshio.read(tmp_path / "solid.msh").cells_dict
+    assert len(kinds["pyramid"]) == len(kinds["quad"]) and len(kinds["tetra"]) > 0 and "triangle" not in kinds
 
 
 def test_readme_python_runs(tmp_path):

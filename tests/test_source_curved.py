@@ -13,7 +13,7 @@ from gmsh_crossquad.cad.read import read_model
 from gmsh_crossquad.cad.spacing import curve_spacing, face_sizes
 from gmsh_crossquad.errors import FieldError, InputError
 from gmsh_crossquad.field.edge_frames import EdgeFrames
-from gmsh_crossquad.field.singularities import corner_rotation, singular_vertices, snap_to_vertices, vertex_index
+from gmsh_crossquad.field.singularities import QUARTER, corner_rotation, singular_vertices, snap_to_vertices, vertex_index
 from gmsh_crossquad.field.smooth import wrap
 from gmsh_crossquad.field.surface_mesh import SurfaceMesh
 from gmsh_crossquad.field_stage import edge_frames
@@ -267,6 +267,21 @@ def test_umbilic_parts_are_filled():
     tensor[band] += np.stack([s * s, c * c, -c * s], axis=1)[band]
     field = Curvature().on(replace(frames, bending=lambda: 3.0 * tensor))
     assert np.abs(wrap(field.theta - theta)).max() < 5e-3
+
+
+def test_quick_turns_of_ninety_degrees_are_none():
+    """The directions change places in a strip that is narrower than a triangle."""
+    frames = curved(sm.cylinder())
+    middle = 0.5 * np.ptp(frames.points[:, 2]) + frames.points[:, 2].min() + 0.011
+    turn = QUARTER / (1 + np.exp(-(frames.places[:, 2] - middle) / 0.01))
+    theta = around_z(frames)
+    c, s = np.cos(theta + turn), np.sin(theta + turn)
+    tensor = np.stack([c * c, s * s, c * s], axis=1)
+    assert np.abs(wrap(turn)).max() > 0.2  # some edges are in the strip
+    field = Curvature().on(replace(frames, bending=lambda: 3.0 * tensor))
+    off = np.abs(wrap(field.theta - theta))
+    assert off.max() < 0.45 and off[np.abs(frames.places[:, 2] - middle) > 0.15].max() < 0.01
+    assert not np.any(singular_vertices(frames.surface, snap_to_vertices(frames.surface, field.rotation))[1])
 
 
 def test_no_curvature_without_a_parametrization():

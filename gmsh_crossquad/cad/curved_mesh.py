@@ -9,6 +9,7 @@ be vertices the triangles are small from the start; the points are put in afterw
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,7 @@ import gmsh
 import numpy as np
 
 from ..errors import MeshError
+from ..field.slivers import without_slivers
 from ..records import Bool, Float, Int, Model
 from . import session
 from .curved_seeds import with_vertices
@@ -27,7 +29,7 @@ from .space_size import SpaceSize
 
 __all__ = ["CurvedMesh", "triangulate_curved"]
 
-ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt
+ALGORITHMS = (5, 6, 1)  # Delaunay, frontal Delaunay (does not end on some surfaces of revolution), MeshAdapt
 PER_TURN = 16  # triangles per full turn of the surface
 MOST_TRIANGLES, FEW_TRIANGLES = 8_000.0, 250.0  # in the model, and of a face of a large one, because of curvature
 POINT, LINE, TRIANGLE, QUAD = 15, 1, 2, 3
@@ -140,7 +142,7 @@ def triangulate_curved(
     problem: dict[int, str] = {}
     snapshot = session.MeshSnapshot.take()
     try:
-        with session.options(**OPTIONS), _only([model.faces[r].tag for r in rows]):
+        with session.options(**OPTIONS), _only(model, rows):
             for algorithm in ALGORITHMS:
                 todo = [r for r in rows if r not in done]
                 if not todo:
@@ -162,13 +164,17 @@ def triangulate_curved(
 
 
 @contextmanager
-def _only(tags: Sequence[int]) -> Iterator[None]:
-    """Show these faces and their curves only."""
+def _only(model: Model, rows: Sequence[int]) -> Iterator[None]:
+    """Show these faces and their curves only; of curves that the model has left out only seams."""
     entities = gmsh.model.getEntities()
     before = [gmsh.model.getVisibility(*e) for e in entities]
-    shown = {(2, t) for t in tags}
-    shown |= {(1, abs(c)) for t in tags for _, c in gmsh.model.getBoundary([(2, t)], combined=False, oriented=False)}
-    shown |= {e for t in tags for e in gmsh.model.mesh.getEmbedded(2, t)}
+    known = {c.tag for c in model.curves}
+    shown: set[tuple[int, int]] = set()
+    for row in rows:
+        tag = model.faces[row].tag
+        bound = Counter(abs(c) for _, c in gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False))
+        shown |= {(2, tag), *((1, c) for c, n in bound.items() if c in known or n % 2 == 0)}
+        shown |= set(gmsh.model.mesh.getEmbedded(2, tag))
     try:
         for e in entities:
             gmsh.model.setVisibility([e], int(e in shown or e[0] == 0))
@@ -343,6 +349,10 @@ def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) 
         np.concatenate(arclength) if arclength else np.zeros((0, 2)),
     )
     _check(out)
+    flipped = without_slivers(out.points, out.triangles, out.segments)
+    if not np.array_equal(flipped, out.triangles):
+        out = replace(out, triangles=flipped)
+        _check(out)
     return out
 
 

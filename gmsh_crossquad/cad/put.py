@@ -20,6 +20,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..records import Float, Int, Model, QuadMesh
+from .periodic import unlink
 from .session import gmsh_errors
 
 __all__ = ["curve_points", "put_mesh", "vertex_points"]
@@ -90,6 +91,7 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
         alone = _isolated_points(model)
         alone_points = [gmsh.model.getValue(0, tag, []) for tag in alone]
         gmsh.model.mesh.clear()
+        unlink()
         element = 1
         free_vertices = {}  # nodes of CAD vertices that Gmsh has not: they belong to their curve
         for tag, node in zip(model.vertex_tags.tolist(), mesh.vertex_node.tolist()):

@@ -18,6 +18,7 @@ from ..records import Curve, Face, Float, Model
 from .curved_face import curved_face, seams
 from .knots import untie
 from .loops import boundary_loops
+from .periodic import linked
 from .plane import face_plane
 from .sample import refine, sample
 from .session import gmsh_errors
@@ -28,6 +29,7 @@ __all__ = ["read_model"]
 
 CONVEX = ("Line", "Circle", "Ellipse")  # cannot meet themselves
 NEARLY_FLAT = 1e-2  # height over extent of the boundary of a plane surface that is meshed as a curved one
+NO_EXTENT = 1e-9  # of the model: shorter open curves are points
 COINCIDENT = 1e-12  # of the model: shorter closed curves are degenerate
 
 
@@ -109,12 +111,12 @@ def read_model(options: MeshOptions) -> Model:
             r.untied = r.points is not tied
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
-    kept = [r for r in raw if not _degenerate(r, scale)]
+    kept = _without_points([r for r in raw if not _degenerate(r, scale)], scale)
     planes = _planes(tags, signs, {r.tag: r.points for r in kept}, origin, scale)
     needed = {abs(int(c)) for d, t in gmsh.model.getPhysicalGroups(1) for c in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     needed |= {c for f in tags for c in inside[f]}
     left = seams(bounds, [f for f in tags if planes[f] is None], needed)
-    if left:
+    if left or len(kept) < len(raw):
         kept = [r for r in kept if r.tag not in left]
         vertices, points = _needed_vertices(vertices, kept, points)
     spacing = transfinite_parameters(
@@ -145,10 +147,18 @@ def read_model(options: MeshOptions) -> Model:
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
         faces=tuple(faces),
-        notes=tuple(f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied),
+        notes=_notes(kept),
         point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
     )
+
+
+def _notes(kept: list[_Raw]) -> tuple[str, ...]:
+    """What the user should know about the model."""
+    notes = [f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied]
+    if linked():
+        notes.append("the mesh is not periodic; periodic links of the model are taken off")
+    return tuple(notes)
 
 
 def _group_names(dim: int) -> dict[int, list[str]]:
@@ -201,6 +211,28 @@ def _read_curve(tag: int, vertices: _Vertices) -> _Raw:
 def _degenerate(raw: _Raw, scale: float) -> bool:
     """A closed curve without extent, as at the pole of a sphere."""
     return raw.ends[0] == raw.ends[1] and bool(np.ptp(raw.points, axis=0).max() <= COINCIDENT * scale)
+
+
+def _without_points(raw: list[_Raw], scale: float) -> list[_Raw]:
+    """The curves but open ones without extent, whose two vertices become one."""
+    short = [r for r in raw if np.ptp(r.points, axis=0).max() <= NO_EXTENT * scale and r.ends[0] != r.ends[1]]
+    if not short:
+        return raw
+    same: dict[int, int] = {}
+
+    def first(v: int) -> int:
+        while v in same:
+            v = same[v]
+        return v
+
+    for r in short:
+        a, b = sorted((first(r.ends[0]), first(r.ends[1])))
+        if a != b:
+            same[b] = a
+    kept = [r for r in raw if not any(r is s for s in short)]
+    for r in kept:
+        r.ends = [first(v) for v in r.ends]
+    return kept
 
 
 def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Curve:

@@ -4,10 +4,12 @@ The bending of the face (the derivative of its unit normal, from the CAD) is a s
 of an edge its deviator ``(W_xx - W_yy)/2 + i W_xy`` has twice the angle of the principal directions, and half the difference of
 the principal curvatures as its length.
 
-Where that difference is less than a hundredth of the greatest curvature of the face, all directions are principal (umbilic
-points, parts of spheres and planes).  There the crosses ``z = exp(4 i theta)`` are filled in smoothly: they are harmonic for the
-connection Laplacian (`connection`), between the places where the directions are known and the boundary, which they are aligned
-with.  A face that is umbilic everywhere has the default smooth field.
+Where that difference is less than a tenth of the greater of them (umbilic points, parts of spheres), where the surface is flat,
+and where the directions turn by more than 36 degrees within a triangle (on twisted surfaces they turn by 90 degrees, which makes
+the same cross, in a narrow strip where the curvatures change places), no direction is taken.  There the crosses
+``z = exp(4 i theta)`` are filled in smoothly: they are harmonic for the connection Laplacian (`connection`), between the places
+where the directions are known and the boundary, which they are aligned with.  A face that is umbilic everywhere has the default
+smooth field.
 """
 
 from __future__ import annotations
@@ -23,16 +25,17 @@ from ..field.operators import FieldOperators, factor
 from ..field.smooth import from_angles
 from ..field.surface_mesh import SurfaceMesh
 from ..records import Bool, CrossField, Float
-from .checks import check_turns
+from .checks import COARSE_TURN, check_turns
 
 if TYPE_CHECKING:
     from ..field.edge_frames import EdgeFrames
 
 __all__ = ["Curvature"]
 
-#: difference of the principal curvatures over the greatest curvature of the face, below which a point is umbilic
-_UMBILIC = 0.01
-#: curvature, over the reciprocal of the face's extent, below which a face is plane
+#: difference of the principal curvatures over the greater of them, below which a point is umbilic
+_UMBILIC = 0.1
+#: greater curvature, over the greatest of the face, below which a point is flat; the same over the reciprocal of its extent
+_FLAT = 1e-3
 _PLANE = 1e-3
 
 
@@ -61,14 +64,24 @@ class Curvature:
             raise FieldError(what, entity=(2, frames.face), remedy="use another cross field there")
         xx, yy, xy = bending.T
         deviator = 0.5 * (xx - yy) + 1j * xy
-        greatest = float((np.abs(0.5 * (xx + yy)) + np.abs(deviator)).max())
-        known = 2.0 * np.abs(deviator) > _UMBILIC * greatest
-        if greatest < _PLANE or not np.any(known):
-            return None
+        greater = np.abs(0.5 * (xx + yy)) + np.abs(deviator)
+        known = (2.0 * np.abs(deviator) > _UMBILIC * greater) & (greater > max(_FLAT * float(greater.max()), _PLANE))
         theta = 0.5 * np.angle(deviator)
+        known &= ~_quick(mesh, theta, known)
+        if not np.any(known):
+            return None
         if not np.all(known):
             theta = _filled(mesh, np.where(known, theta, 0.0), known | mesh.boundary_edge)
         return check_turns(frames, from_angles(mesh, theta))
+
+
+def _quick(mesh: SurfaceMesh, theta: Float, known: Bool) -> Bool:
+    """(e,) the edges around triangles with known directions that turn too much to tell which way."""
+    turn = np.abs(from_angles(mesh, theta).rotation).max(axis=1)
+    near = np.zeros(len(mesh.points), bool)
+    near[mesh.triangles[(turn > COARSE_TURN) & known[mesh.triangle_edges].all(axis=1)]] = True
+    out: Bool = near[mesh.edges].any(axis=1)
+    return out
 
 
 def _filled(mesh: SurfaceMesh, theta: Float, known: Bool) -> Float:

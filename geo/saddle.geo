@@ -1,0 +1,20 @@
+// A saddle over a square: z = (x^2 - y^2) / 2, as a Bezier surface through its four sides.
+SetFactory("OpenCASCADE");
+Point(1) = {-1, -1, 0};
+Point(2) = {1, -1, 0};
+Point(3) = {1, 1, 0};
+Point(4) = {-1, 1, 0};
+Point(5) = {0, -1, -1};
+Point(6) = {1, 0, 1};
+Point(7) = {0, 1, -1};
+Point(8) = {-1, 0, 1};
+Bezier(1) = {1, 5, 2};
+Bezier(2) = {2, 6, 3};
+Bezier(3) = {3, 7, 4};
+Bezier(4) = {4, 8, 1};
+Curve Loop(1) = {1 : 4};
+Bezier Surface(1) = {1};
+Physical Surface("saddle", 1) = {1};
+Physical Curve("low", 2) = {1, 3};
+Physical Curve("high", 3) = {2, 4};
+Mesh.MeshSizeMax = 0.1;
