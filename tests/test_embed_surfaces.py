@@ -107,10 +107,10 @@ def test_shaken_grids_come_back(name: str, amplitude: float) -> None:
     guide, model, surfaces = grid = GRIDS[name]
     start = shaken(grid, amplitude * edge_length(guide), 1)
     if amplitude:
-        assert guide_quality(start, surfaces).min() < 0.0
+        assert guide_quality(start, surfaces, model).min() < 0.0
     out, report = smooth(start, model, surfaces)
     check(out, grid)
-    quality = guide_quality(out, surfaces)
+    quality = guide_quality(out, surfaces, model)
     assert report.min_scaled_jacobian == quality.min() > LEAST.get(name, 0.93)
 
 
@@ -196,14 +196,14 @@ def test_laplace_start_on_a_surface(name: str) -> None:
     inner = np.flatnonzero((guide.curve < 0) & ~guide.fixed)
     off = start.points[inner] - surfaces.feet(np.zeros(len(inner), np.int64), start.points[inner])
     assert np.abs(off).max() < 1e-12
-    assert guide_quality(start, surfaces).min() > 0.5
+    assert guide_quality(start, surfaces, model).min() > 0.5
 
 
 def test_quality_sees_quads_turned_over_on_a_sphere() -> None:
-    guide, _, surfaces = GRIDS["cube"]
-    quality = guide_quality(guide, surfaces)
+    guide, model, surfaces = GRIDS["cube"]
+    quality = guide_quality(guide, surfaces, model)
     assert quality.min() > 0.8
-    assert guide_quality(replace(guide, quads=guide.quads[:, ::-1]), surfaces).max() < -0.8
+    assert guide_quality(replace(guide, quads=guide.quads[:, ::-1]), surfaces, model).max() < -0.8
 
 
 def test_smoothing_on_a_sphere_is_deterministic() -> None:
@@ -307,7 +307,7 @@ def test_placing_on_a_quarter_of_a_cylinder() -> None:
     assert len(guide.quads) == 36
     inner = guide.points[guide.curve < 0]
     assert np.hypot(inner[:, 0], inner[:, 1]) == pytest.approx(1.0, abs=1e-12)
-    assert guide_quality(guide, surfaces).min() > 0.95
+    assert guide_quality(guide, surfaces, model).min() > 0.95
     angle = np.arctan2(guide.points[:, 1], guide.points[:, 0])
     assert np.abs(angle[:, None] - np.linspace(0, 0.5 * np.pi, 7)).min(axis=1).max() < 0.07
 
@@ -339,5 +339,5 @@ def test_a_closed_face_without_curves_can_be_placed() -> None:
     guide = place(model, surfaces, tmesh, quotient(tmesh, np.array([16, 8])))
     assert (len(guide.points), len(guide.quads)) == (128, 128)
     assert guide.points == pytest.approx(surfaces.feet(np.zeros(128, np.int64), guide.points), abs=1e-12)
-    assert guide_quality(guide, surfaces).min() > 0.9
+    assert guide_quality(guide, surfaces, model).min() > 0.9
     assert smooth(guide, model, surfaces)[1].min_scaled_jacobian > 0.97

@@ -183,7 +183,7 @@ def test_scaled_jacobian_in_chunks() -> None:
 
 def test_guide_quality_knows_the_planes_of_the_faces() -> None:
     guide, model = fold(3, 2.0)
-    assert guide_quality(guide, Planes(model)) == pytest.approx(1.0)
+    assert guide_quality(guide, Planes(model), model) == pytest.approx(1.0)
 
 
 def test_chain_terms_by_hand() -> None:

@@ -49,7 +49,7 @@ def test_shaken_grids_come_back(name: str, amplitude: float) -> None:
     start = shaken(guide, model, amplitude, 7, slide=amplitude > 0.1)
     out, report = smooth(start, model, Planes(model))
     check(out, model, start)
-    quality = guide_quality(out, Planes(model))
+    quality = guide_quality(out, Planes(model), model)
     assert report.min_scaled_jacobian == quality.min()
     assert len(report.inverted) == 0
     assert quality.min() > 0.95
@@ -130,7 +130,7 @@ def test_a_tiny_feature_is_untangled_too() -> None:
     size = np.linalg.norm(points[inner], axis=1)[:, None] * [0.4, 0.4, 0.0]
     points[inner] += size * random.normal(size=(len(inner), 3))
     start = replace(guide, points=points)
-    assert guide_quality(start, Planes(model))[: 6 * 6].min() < 0
+    assert guide_quality(start, Planes(model), model)[: 6 * 6].min() < 0
     out, report = smooth(start, model, Planes(model))
     check(out, model, guide)
     assert report.min_scaled_jacobian > 0.9

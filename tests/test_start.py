@@ -129,7 +129,7 @@ def test_laplace_start_forgets_the_start(make) -> None:  # type: ignore[no-untyp
     guide, model = make()
     one, two = (laplace_start(shaken(guide, model, 1.0, seed), model, Planes(model), CurveTable(model.curves)) for seed in (1, 2))
     assert one.points == pytest.approx(two.points, abs=1e-12)
-    assert guide_quality(one, Planes(model)).min() > 0.5
+    assert guide_quality(one, Planes(model), model).min() > 0.5
 
 
 def edge_lengths(guide: Guide, sides: Float) -> tuple[Int, Float]:

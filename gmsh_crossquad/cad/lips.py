@@ -25,6 +25,8 @@ def coincident(model: Model) -> list[tuple[int, int, bool]]:
     out = []
     for face in model.faces:
         rows = list(dict.fromkeys(c for loop in face.loops for c, _ in loop))
+        if len(rows) < 2 or face.curved:
+            continue
         middles = np.stack([model.curves[c].at(np.array([0.5 * model.curves[c].length]))[0] for c in rows])
         order = np.argsort(middles @ [1.0, 0.7, 0.3], kind="stable")
         sorted_middles = middles[order]

@@ -15,6 +15,8 @@ the positive semidefinite matrix
 
     M = 2 phi_N I + 4 phi_NN J J^T + 2 phi_ND (J c^T + c J^T) + phi_DD c c^T,      c = dD/dJ.
 
+Corners can be left out, such as those in cusps: the other three of the quad then settle at 120 degrees.
+
 References
 ----------
 .. [1] V. Garanzha, I. Kaporin, L. Kudryavtseva, F. Protais, N. Ray, D. Sokolov, "Foldover-free maps in 50 lines of
@@ -25,7 +27,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..records import Float
+from ..records import Bool, Float
 
 __all__ = ["AREA_WEIGHT", "corner_areas", "corner_energy", "corner_hessian"]
 
@@ -66,7 +68,9 @@ def _power(h: Float, power: int) -> Float:
     return out
 
 
-def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tuple[float, Float, Float]:
+def corner_energy(
+    x: Float, y: Float, rest: Float, eps: float, power: int, without: Bool | None = None
+) -> tuple[float, Float, Float]:
     """Energy of all corners and its gradient.
 
     Parameters
@@ -79,6 +83,8 @@ def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tu
         Regularisation; 0 is the barrier.
     power : int
         p, the power on the shape term.
+    without : (4, q) bool, optional
+        Corners that do not count.
 
     Returns
     -------
@@ -90,6 +96,8 @@ def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tu
     ex, ey = _edges(x, y, rest)
     fx, fy = ex.take(PREVIOUS, 0), ey.take(PREVIOUS, 0)
     area = fx * ey - fy * ex
+    if without is not None:
+        area = np.where(without, 1.0, area)
     if eps == 0.0 and not area.min(initial=np.inf) > 0.0:
         return np.inf, ex, ey
     square = ex * ex + ey * ey
@@ -99,9 +107,13 @@ def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tu
     h = 0.5 * square * inverse
     w = 0.5 * (1.0 + area * area) * inverse
     h_power = _power(h, power - 1)
+    if without is not None:
+        h_power, w = np.where(without, 0.0, h_power), np.where(without, 0.0, w)
     energy = float((h_power * h).sum() + AREA_WEIGHT * w.sum())
     by_square = power * h_power * inverse  # 2 phi_N
     by_area = AREA_WEIGHT * area * inverse - slope * inverse * (power * h_power * h + AREA_WEIGHT * w)
+    if without is not None:
+        by_area = np.where(without, 0.0, by_area)
     both = by_square + by_square.take(NEXT, 0)
     after_x, after_y = ex.take(NEXT, 0), ey.take(NEXT, 0)
     by_after = by_area.take(NEXT, 0)
@@ -110,12 +122,12 @@ def corner_energy(x: Float, y: Float, rest: Float, eps: float, power: int) -> tu
     return energy, gex.take(PREVIOUS, 0) - gex, gey.take(PREVIOUS, 0) - gey
 
 
-def corner_hessian(x: Float, y: Float, rest: Float, eps: float, power: int) -> Float:
+def corner_hessian(x: Float, y: Float, rest: Float, eps: float, power: int, without: Bool | None = None) -> Float:
     """Positive semidefinite Hessian of every quad.
 
     Parameters
     ----------
-    x, y, rest, eps, power
+    x, y, rest, eps, power, without
         As in `corner_energy`.
 
     Returns
@@ -126,6 +138,8 @@ def corner_hessian(x: Float, y: Float, rest: Float, eps: float, power: int) -> F
     ex, ey = _edges(x, y, rest)
     fx, fy = ex.take(PREVIOUS, 0), ey.take(PREVIOUS, 0)
     area = fx * ey - fy * ex
+    if without is not None:
+        area = np.where(without, 1.0, area)
     square = ex * ex + ey * ey + fx * fx + fy * fy
     chi, slope = _chi(area, eps)
     h = 0.5 * square / chi
@@ -146,6 +160,8 @@ def corner_hessian(x: Float, y: Float, rest: Float, eps: float, power: int) -> F
     corner = nn * jacobian[:, None] * jacobian + nd * (mixed + mixed.swapaxes(0, 1)) + dd * cofactor[:, None] * cofactor
     for c in range(4):
         corner[c, c] += n1
+    if without is not None:
+        corner *= ~without
     q = x.shape[1]
     edge = np.zeros((4, 2, 4, 2, q))
     for k in range(4):

@@ -5,11 +5,11 @@ The coordinates z are relative to the local rest length l, so that small feature
     interior vertex    x = x0 + l (z_1 b_1 + z_2 b_2)        b: axes of its plane face, or of the tangent plane of a curved one,
     vertex on a curve  s = s0 + l z,   x = C(s)              in all its faces at once.
 
-The energy is that of the corners (`energy`) and of the edges on curves (`chain_energy`).  A quad's corners are seen in a
-frame (o, a): that of its plane face, or on a curved face the tangent plane of the surface at the quad's middle.  A vertex seen
-in a frame is a *node*, with the plane coordinates y = a (x - o) and, on a curved face, dy/dz = l a b^T.  All frames are frozen;
-`positions` puts the vertices back on their surfaces.  The Hessian is positive definite: it drops the curvature of curves
-and surfaces, and what the two modules drop.
+The energy is that of the corners (`energy`), but those in cusps, and of the edges on curves (`chain_energy`).  A quad's
+corners are seen in a frame (o, a): that of its plane face, or on a curved face the tangent plane of the surface at the quad's
+middle.  A vertex seen in a frame is a *node*, with the plane coordinates y = a (x - o) and, on a curved face, dy/dz = l a b^T.
+All frames are frozen; `positions` puts the vertices back on their surfaces.  The Hessian is positive definite: it drops the
+curvature of curves and surfaces, and what the two modules drop.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ..cusps import cusp_corners
 from ..errors import MeshError
 from ..records import Float, Guide, Int, Model
 from ..surfaces import Surfaces
@@ -65,6 +66,8 @@ class GridEnergy:
         # Frames: one per face (unused where it is curved), then one per quad on a curved face.
         bent = surfaces.curved[guide.quad_face]
         self._bent = np.flatnonzero(bent)
+        cusps = cusp_corners(guide, model)
+        self._without = cusps.T.copy() if cusps.any() else None
         frame = np.where(bent, len(model.faces) + np.cumsum(bent) - 1, guide.quad_face)
         origins, frames = self._frames(model)
         # Nodes: those of interior vertices of plane faces come first, then those of curved faces, of sliding vertices and of
@@ -159,9 +162,10 @@ class GridEnergy:
         return np.einsum("nc,nac->an", derivative[self._slide_row, :3], self._slide_axes)
 
     def areas(self, z: Float, sides: Float) -> Float:
-        """Signed corner areas (4, q) over those at rest."""
+        """Signed corner areas (4, q) over those at rest; 1 in cusps."""
         x, y = self._corners(z, self._places(z)[1])
-        return corner_areas(x, y, sides)
+        areas = corner_areas(x, y, sides)
+        return areas if self._without is None else np.where(self._without, 1.0, areas)
 
     def value(self, z: Float, sides: Float, eps: float, power: int) -> tuple[float, Float]:
         """Energy and gradient.
@@ -185,7 +189,7 @@ class GridEnergy:
         energy, by_place, by_turning = self._chains.value(s, world[:, 3])
         if energy == np.inf:
             return energy, gradient
-        corners, gx, gy = corner_energy(*self._corners(z, world), sides, eps, power)
+        corners, gx, gy = corner_energy(*self._corners(z, world), sides, eps, power, self._without)
         energy += corners
         if energy == np.inf:
             return energy, gradient
@@ -211,7 +215,7 @@ class GridEnergy:
         from scipy.sparse.linalg import splu
 
         s, world, derivative = self._places(z)
-        blocks = corner_hessian(*self._corners(z, world), sides, eps, power)
+        blocks = corner_hessian(*self._corners(z, world), sides, eps, power, self._without)
         first, middle, last = self._node_range
         scale = np.zeros_like(self._plane)
         scale[:, :first] = self._inner_length[self._inner_freedom]

@@ -69,6 +69,8 @@ WORTH = 4.0
 where the worst corners cannot become good (one block at a straight angle), a high power spoils all others for them."""
 LEAST_AREA = 1e-3
 LEAST_EPS = 1e-4
+HOPELESS_ROUNDS, HOPELESS = 5, 0.1
+"""On curved faces a start is given up if after so many rounds more than this share of the quads is still turned over."""
 FEW_ROUNDS = 4
 """Greatest number of untangling rounds where another start has led to a valid grid."""
 DOUBTFUL = 0.05
@@ -118,7 +120,7 @@ class _Ground(NamedTuple):
         return bool(self.surfaces.curved.any())
 
     def quality(self, guide: Guide) -> Float:
-        return guide_quality(guide, self.surfaces)
+        return guide_quality(guide, self.surfaces, self.model)
 
     def rest(self, guide: Guide, actual: float = 0.0, graded: bool = True) -> RestLengths:
         return rest_lengths(guide, self.model, self.surfaces, self.table, actual=actual, graded=graded)
@@ -222,6 +224,8 @@ def _untangle(guide: Guide, ground: _Ground, rest: RestLengths, sides: Float, mo
             guide = _moved(guide, grid, z)
             grid, z = ground.energy(guide, rest), np.zeros(grid.size)
         rounds += 1
+        if bent and rounds == HOPELESS_ROUNDS and np.mean(ground.quality(guide) <= 0.0) > HOPELESS:
+            break
         before, least = least, float(grid.areas(z, sides).min())
         if rounds > 6 and least <= 0.0 and abs(least - before) < 1e-6 * abs(before):
             break

@@ -15,6 +15,7 @@ import numpy as np
 from ..records import Bool, Float, Guide, Int
 from ..surfaces import Surfaces
 from .coons import coons, grid_quads, grid_quality, surface_quality
+from .cusp_grid import cusp_grid
 from .numbering import GuideTopology, Numbering, edge_nodes
 from .skeleton import Frames, Skeleton
 
@@ -30,7 +31,7 @@ SIDES = ((0, 1), (1, 2), (3, 2), (0, 3))
 
 @dataclass(frozen=True)
 class Cells:
-    """All cells of a guide grid."""
+    """All cells of a guide grid; `cusps` (q, 4) are their corners in cusps."""
 
     guide: Guide
     topology: GuideTopology
@@ -38,6 +39,7 @@ class Cells:
     skeleton: Skeleton
     frames: Frames
     surfaces: Surfaces
+    cusps: Bool
 
     @property
     def divisions(self) -> Int:
@@ -69,10 +71,10 @@ class Cells:
         plane, curved = self._kinds(np.arange(len(face)))
         out = np.empty(len(face))
         x = self.frames.local(corners[plane], face[plane])
-        out[plane] = grid_quality(x[:, :, [0, 3, 1, 2]].reshape(2, -1, 2, 2))
+        out[plane] = grid_quality(x[:, :, [0, 3, 1, 2]].reshape(2, -1, 2, 2), self._cusps(plane))
         if len(curved):
             x = np.moveaxis(corners[curved][:, [0, 3, 1, 2]], -1, 0).reshape(3, -1, 2, 2)
-            out[curved] = surface_quality(x, self._normals([(curved, x)])[0])
+            out[curved] = surface_quality(x, self._normals([(curved, x)])[0], self._cusps(curved))
         return out
 
     def place(self, which: Int, points: Float) -> Float:
@@ -84,6 +86,11 @@ class Cells:
             self._place_curved(curved, points, worst)
         return worst[which]
 
+    def _cusps(self, which: Int) -> Bool | None:
+        """Corners of the cells `which` in cusps, None if there are none."""
+        cusps: Bool = self.cusps[which]
+        return cusps if cusps.any() else None
+
     def _kinds(self, which: Int) -> tuple[Int, Int]:
         """The cells of plane and of curved faces among `which`."""
         curved = self.frames.curved[self.guide.quad_face[which]]
@@ -93,8 +100,8 @@ class Cells:
         """`place` for cells of plane faces; their quality goes to `worst` (q,)."""
         for q, ku, kv in self.groups(which):
             face = self.guide.quad_face[q]
-            grid = coons(*(self.frames.local(self._side(q, s, (ku, kv)[s % 2]), face) for s in range(4)))
-            worst[q] = grid_quality(grid)
+            grid = self._grid(q, *(self.frames.local(self._side(q, s, (ku, kv)[s % 2]), face) for s in range(4)))
+            worst[q] = grid_quality(grid, self._cusps(q))
             if ku > 1 and kv > 1:
                 inside = grid[:, :, 1:-1, 1:-1].reshape(2, len(q), -1)
                 _put(points, self.numbering.cell_first[q], self.frames.user(inside, face))
@@ -102,7 +109,7 @@ class Cells:
     def _place_curved(self, which: Int, points: Float, worst: Float) -> None:
         """`place` for cells of curved faces; their quality goes to `worst` (q,)."""
         parts = [
-            (q, coons(*(np.moveaxis(self._side(q, s, (ku, kv)[s % 2]), -1, 0) for s in range(4))))
+            (q, self._grid(q, *(np.moveaxis(self._side(q, s, (ku, kv)[s % 2]), -1, 0) for s in range(4))))
             for q, ku, kv in self.groups(which)
         ]
         inside = [grid[:, :, 1:-1, 1:-1] for _, grid in parts]
@@ -112,7 +119,19 @@ class Cells:
             if rows.shape[1]:
                 _put(points, self.numbering.cell_first[q], self.frames.user_of_scaled(rows))
         for (q, grid), normals in zip(parts, self._normals(parts)):
-            worst[q] = surface_quality(grid, normals)
+            worst[q] = surface_quality(grid, normals, self._cusps(q))
+
+    def _grid(self, q: Int, bottom: Float, right: Float, top: Float, left: Float) -> Float:
+        """Grids (d, m, ku + 1, kv + 1) of the cells `q` between their sides: by Coons' rule, those in cusps by their own."""
+        out = coons(bottom, right, top, left)
+        if max(out.shape[2:]) > 2:
+            for row, corner in np.argwhere(self.cusps[q]).tolist():
+                # seen from the cusp: against u at corners 1 and 2, against v at 2 and 3
+                u, v = (-1 if corner in (1, 2) else 1), (-1 if corner in (2, 3) else 1)
+                across = (bottom, top)[::v], (left, right)[::u]
+                near, far, side, other = (x[:, row, ::way] for pair, way in zip(across, (u, v)) for x in pair)
+                out[:, row, ::u, ::v] = cusp_grid(near, other, far, side)
+        return out
 
     def _normals(self, parts: list[tuple[Int, Float]]) -> list[Float]:
         """Surface normals (3, m, ku, kv) at the quads of grids, from up to `SAMPLES` quads per direction."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..records import Float, Int
+from ..records import Bool, Float, Int
 
 __all__ = ["coons", "grid_quads", "grid_quality", "surface_quality"]
 
@@ -61,12 +61,14 @@ def _relative_length(a: Float, b: Float) -> Float:
     return out
 
 
-def grid_quality(grid: Float) -> Float:
+def grid_quality(grid: Float, cusps: Bool | None = None) -> Float:
     """Least scaled Jacobian of planar grids.
 
     Parameters
     ----------
     grid : (2, m, ku + 1, kv + 1) float64
+    cusps : (m, 4) bool, optional
+        Corners of the grids that lie in a cusp: there a sine counts only where it is not positive.
 
     Returns
     -------
@@ -79,15 +81,15 @@ def grid_quality(grid: Float) -> Float:
         length = np.sqrt(d[0] * d[0] + d[1] * d[1])
         d /= np.maximum(length, tiny, out=length)
     worst = np.ones(grid.shape[1])
-    for a in (du[..., :-1], du[..., 1:]):
-        for b in (dv[:, :, :-1], dv[:, :, 1:]):
-            sine = a[0] * b[1]
-            sine -= a[1] * b[0]
-            np.minimum(worst, sine.min(axis=(1, 2)), out=worst)
+    for k, (a, b) in enumerate((a, b) for a in (du[..., :-1], du[..., 1:]) for b in (dv[:, :, :-1], dv[:, :, 1:])):
+        sine = a[0] * b[1]
+        sine -= a[1] * b[0]
+        _forgive(sine, k, cusps)
+        np.minimum(worst, sine.min(axis=(1, 2)), out=worst)
     return worst
 
 
-def surface_quality(grid: Float, normals: Float) -> Float:
+def surface_quality(grid: Float, normals: Float, cusps: Bool | None = None) -> Float:
     """Least scaled Jacobian of grids on curved faces, every quad against its own area vector on the side of the surface's normal.
 
     Parameters
@@ -95,6 +97,8 @@ def surface_quality(grid: Float, normals: Float) -> Float:
     grid : (3, m, ku + 1, kv + 1) float64
     normals : (3, m, ku, kv) float64
         Of the surface at every quad.
+    cusps : (m, 4) bool, optional
+        As for `grid_quality`.
 
     Returns
     -------
@@ -110,12 +114,20 @@ def surface_quality(grid: Float, normals: Float) -> Float:
     for d in (du, dv):
         d /= np.maximum(np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]), tiny)
     worst = np.ones(grid.shape[1])
-    for a in (du[..., :-1], du[..., 1:]):
-        for b in (dv[:, :, :-1], dv[:, :, 1:]):
-            corner = _cross(a, b)
-            corner *= area
-            np.minimum(worst, corner.sum(axis=0).min(axis=(1, 2)), out=worst)
+    for k, (a, b) in enumerate((a, b) for a in (du[..., :-1], du[..., 1:]) for b in (dv[:, :, :-1], dv[:, :, 1:])):
+        corner = _cross(a, b)
+        corner *= area
+        sine = corner.sum(axis=0)
+        _forgive(sine, k, cusps)
+        np.minimum(worst, sine.min(axis=(1, 2)), out=worst)
     return worst
+
+
+def _forgive(sine: Float, corner: int, cusps: Bool | None) -> None:
+    """Let positive sines (m, ku, kv) in cusps count as 1; `corner` is 0 to 3 for (u, v) = (0, 0), (1, 0), (0, 1), (1, 1)."""
+    if cusps is not None:
+        here = sine[:, -(corner % 2), -(corner // 2)]
+        here[cusps[:, (0, 1, 3, 2)[corner]] & (here > 0.0)] = 1.0
 
 
 def _cross(a: Float, b: Float) -> Float:

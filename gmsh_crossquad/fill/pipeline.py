@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..cusps import cusp_corners
 from ..errors import InputError, MeshError
 from ..records import Bool, Float, Guide, Int, Model, QuadMesh
 from ..surfaces import Surfaces
@@ -113,7 +114,7 @@ def poor_cells(
     -------
     poor : (k,) int64
         Rows of ``guide.quads`` with a fine quad worse than half of the guide quad's own scaled Jacobian, although their
-        inner edges were straightened.
+        inner edges were straightened; in a cusp those with an inverted one.
     folded : (l,) int64
         Those of them that have an inverted fine quad.
     """
@@ -128,7 +129,7 @@ def poor_cells(
     work = _Work.start(model, surfaces, guide, shown, evaluate, vertices)
     own = work.cells.corner_quality()
     quality = work.place(own)
-    return np.flatnonzero(quality < KEEP * np.maximum(own, POOR)), np.flatnonzero(quality <= 0)
+    return np.flatnonzero(quality < work.wanted(own)), np.flatnonzero(quality <= 0)
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class _Work:
         points[numbering.vertex_node[used]] = exact[used]
         skeleton = Skeleton.start(guide, pieces)
         skeleton.put_vertices(guide, topology, surfaces)
-        cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces)
+        cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces, cusp_corners(guide, model))
         work = cls(model, cells, evaluate, points, [np.empty(0)] * len(guide.chains))
         for row in range(len(guide.chains)):
             work.put_curve(row, np.zeros(len(edges)))
@@ -183,6 +184,11 @@ class _Work:
         self.parameters[row] = t
         cells.skeleton.put_chain(chain, e, cells.topology.chain_forward[row], (self.points[nodes] - model.origin) / model.scale)
 
+    def wanted(self, own: Float) -> Float:
+        """(q,) Least scaled Jacobian that the fine quads of every cell should have; in cusps any that is positive."""
+        out: Float = np.where(self.cells.cusps.any(axis=1), np.finfo(float).tiny, KEEP * np.maximum(own, POOR))
+        return out
+
     def place(self, own: Float) -> Float:
         """Place all that is inside faces, straightening the edges of bad cells; the least scaled Jacobian of every cell."""
         cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
@@ -192,9 +198,9 @@ class _Work:
         skeleton.put_cubics(np.flatnonzero(~topology.on_curve), topology, tangents, *on_surfaces)
         worst = cells.place(np.arange(len(quad_edges)), self.points)
         worst = self._bend(worst, tangents)
-        even = np.zeros(len(edges))
+        even, wanted = np.zeros(len(edges)), self.wanted(own)
         for share in SHARES:
-            bad: Bool = worst <= 0.0 if share == 1.0 else worst < KEEP * np.maximum(own, POOR)
+            bad: Bool = worst <= 0.0 if share == 1.0 else worst < wanted
             soft: Bool = np.zeros(len(edges), bool)
             soft[quad_edges[bad]] = True
             soft &= skeleton.divisions > 1
@@ -214,7 +220,6 @@ class _Work:
             worst[again] = cells.place(again, self.points)
         skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)
         return worst
-
 
     def _bend(self, worst: Float, tangents: Float) -> Float:
         """Let the inner sides of folded cells run along the CAD curve on the other side, where that is better.

@@ -26,10 +26,11 @@ def has_divisions(model: Model, mesh: FaceMesh, tmesh: FaceTMesh) -> bool:
     mesh, tmesh
         Of the same face.
     """
-    single = glue(replace(model, faces=(model.faces[mesh.face],)), [mesh], [tmesh])
+    alone = replace(model, faces=(model.faces[mesh.face],))
+    single = glue(alone, [mesh], [tmesh])
     try:
         # lengths do not matter for this; few divisions make it fast
-        quantize(model, single, np.maximum(single.length / (0.25 * single.length.max()), 0.5))
+        quantize(alone, single, np.maximum(single.length / (0.25 * single.length.max()), 0.5))
     except LayoutError:
         return False
     return True

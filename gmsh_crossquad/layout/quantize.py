@@ -26,8 +26,8 @@ from .alignment import alignment
 from .arc_bends import arc_bends
 from .cuts import Cut, separation_cuts
 from .handles import handle_cuts, homology
-from .integer_program import IntegerProgram
 from .quotient import quotient
+from .separable import SeparableProgram, parts_of_arcs
 
 __all__ = ["Quantization", "quantize"]
 
@@ -121,7 +121,8 @@ def quantize(
     largest = 4.0 * max(float(target.max(initial=0.0)), 10.0) + 20.0 + len(model.curves)  # opposite a run of short curves
     arc, step, cost, upper = _columns(target, largest)
     expand = sp.csr_array((step, (arc, np.arange(len(arc)))), shape=(n_arcs, len(arc)))
-    program = IntegerProgram(cost, upper)
+    part = parts_of_arcs(tmesh)
+    program = SeparableProgram(cost, upper, part[arc])
 
     def add(rows: sp.csr_array, lower: Float, most: Float) -> None:
         on_columns = (rows @ expand).tocsr()
@@ -130,8 +131,9 @@ def quantize(
         program.add_rows(lower - shift, most - shift, start, column, on_columns.data)
 
     rows, slack, price = alignment(tmesh, target)
-    first = program.add_columns(np.repeat(price, 2), np.full(2 * len(slack), np.inf), integral=False)
     if len(slack):
+        of_row = part[rows.indices[rows.indptr[:-1]]]
+        first = program.add_columns(np.repeat(price, 2), np.full(2 * len(slack), np.inf), np.repeat(of_row, 2), integral=False)
         on_columns = (rows @ expand).tocoo()
         k = np.arange(len(slack))
         shift = rows @ floor
@@ -163,7 +165,7 @@ def quantize(
     big = largest + float(floor.max(initial=0.0))
     for round_ in range(1, MAX_ROUNDS + 1):
         known.update(new)
-        _add_cuts(program, new if disjunctions else [Cut(c.options[:1]) for c in new], expand, floor, big)
+        _add_cuts(program, new if disjunctions else [Cut(c.options[:1]) for c in new], expand, floor, big, part)
         solution = program.solve()
         if solution is None:
             raise LayoutError(
@@ -212,7 +214,7 @@ def _columns(target: Float, largest: float) -> tuple[Int, Float, Float, Float]:
     return arc, sign, cost, upper
 
 
-def _add_cuts(program: IntegerProgram, cuts: list[Cut], expand: sp.csr_array, floor: Float, big: float) -> None:
+def _add_cuts(program: SeparableProgram, cuts: list[Cut], expand: sp.csr_array, floor: Float, big: float, part: Int) -> None:
     """Add cuts as rows; a disjunction takes one binary column per option and big-M."""
     start: list[int] = []
     column: list[int] = []
@@ -220,7 +222,9 @@ def _add_cuts(program: IntegerProgram, cuts: list[Cut], expand: sp.csr_array, fl
     lower: list[float] = []
     for cut in cuts:
         many = len(cut.options) > 1
-        first = program.add_columns(np.zeros(len(cut.options)), np.ones(len(cut.options))) if many else 0
+        if many:
+            own = np.full(len(cut.options), part[cut.options[0][0][0][0]])
+            first = program.add_columns(np.zeros(len(own)), np.ones(len(own)), own)
         for k, (expression, bound) in enumerate(cut.options):
             start.append(len(column))
             shift = 0.0
