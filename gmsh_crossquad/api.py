@@ -35,8 +35,9 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     progress : callable, optional
         Called with the name of every stage when it starts.
     **options
-        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `order`, `incomplete`, `feature_angle`, `max_quads`,
-        `block_size`, `background`.  What is not given here may be set in the model, as ONELAB parameters "CrossQuad/...".
+        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `order`, `incomplete`,
+        `feature_angle`, `max_quads`, `block_size`, `background`.  What is not given here may be set in the model, as ONELAB
+        parameters "CrossQuad/...".
 
     Returns
     -------

@@ -96,7 +96,7 @@ class JoinedSurfaces:
         return np.array([face.curved for face in self.model.faces], bool)
 
     def part(self, face: Int, points: Float) -> tuple[Int, Bool, Float]:
-        """Rows (n,) of the parts of faces that points are nearest to, whether they are nearest to a joint, and the place there."""
+        """Rows (n,) of the parts that points of faces are nearest to, whether that is on a joint, and where there."""
         inner, first = self._split
         out, on_joint, place = first[face], np.zeros(len(face), bool), np.zeros((len(face), 3))
         for row, search in self._searches.items():

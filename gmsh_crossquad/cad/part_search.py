@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import gmsh
 import numpy as np
@@ -26,6 +26,18 @@ RINGS = 2  # of points around a joint at which the nearest point alone does not 
 CLOSE = 3.0  # times the height of the arcs over their chords
 NEAREST = 4  # edges that are tried
 ROUNDS = 8
+
+
+class _Edges(NamedTuple):
+    """Edges on joints, for each of their two parts once."""
+
+    ends: Float
+    curve: Int
+    at: Float  # parameters of the ends
+    height: Float  # of the arc over its chord
+    part: Int
+    other: Int
+    run: Int  # 1 where the triangle of the part runs with the curve, -1 where against it
 
 
 @dataclass(frozen=True)
@@ -73,7 +85,7 @@ class PartSearch:
         part[unsure] = triangle_part[triangle]
         away = np.linalg.norm(foot - points[unsure], axis=1)
         edge, distance = self._nearest_edge(foot, part[unsure])
-        close = distance < CLOSE * (away + self._edges[3][edge]) + 1e-12
+        close = distance < CLOSE * (away + self._edges.height[edge]) + 1e-12
         self._decide(points, unsure[close], edge[close], part, on_joint, place)
         return part, on_joint, place
 
@@ -101,27 +113,25 @@ class PartSearch:
         return Facets(np.concatenate(self.parts.points), triangles), owner
 
     @cached_property
-    def _edges(self) -> tuple[Float, Int, Float, Float, Int, Int, Int]:
-        """Of all edges on joints: ends, curve, parameters, height of the arc, part, other part, whether the triangle of the part
-        runs with the curve (1) or against it (-1)."""
+    def _edges(self) -> _Edges:
         parts = self.parts
         ends = np.concatenate([p[e] for p, e in zip(parts.points, parts.edges, strict=True)])
-        curve, at, other = (np.concatenate(a) for a in (parts.curve, parts.at, parts.other))
-        part = np.repeat(np.arange(len(parts.edges)), [len(e) for e in parts.edges])
+        curve, at, other = np.concatenate(parts.curve), np.concatenate(parts.at), np.concatenate(parts.other)
+        part = np.repeat(np.arange(len(parts.edges), dtype=np.int64), [len(e) for e in parts.edges])
         runs = []
         for triangles, edges, points in zip(parts.triangles, parts.edges, parts.points, strict=True):
             half = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
             forward = np.isin(edges[:, 0] * len(points) + edges[:, 1], half[:, 0] * len(points) + half[:, 1])
-            runs.append(np.where(forward, 1, -1))
+            runs.append(np.where(forward, 1, -1).astype(np.int64))
         middle, _ = self._curve_points(curve, at.mean(axis=1))
         height = np.linalg.norm(middle - ends.mean(axis=1), axis=1)
-        return ends, curve, at, height, part, other, np.concatenate(runs)
+        return _Edges(ends, curve, at, height, part, other, np.concatenate(runs))
 
     def _nearest_edge(self, points: Float, part: Int) -> tuple[Int, Float]:
         """The nearest edge of the joints of each point's part, and its distance."""
         from ..spatial import cKDTree
 
-        ends, owner = self._edges[0], self._edges[4]
+        ends, owner = self._edges.ends, self._edges.part
         edge, distance = np.zeros(len(points), np.int64), np.full(len(points), np.inf)
         for p in np.unique(part).tolist():
             mine, rows = np.flatnonzero(owner == p), np.flatnonzero(part == p)
@@ -139,7 +149,8 @@ class PartSearch:
         """Set what the curves say about the points `rows`, each beside the joint of an edge."""
         if not len(rows):
             return
-        ends, curve, at, _, owner, other, run = (a[edge] for a in self._edges)
+        e = self._edges
+        ends, curve, at, owner, other, run = e.ends[edge], e.curve[edge], e.at[edge], e.part[edge], e.other[edge], e.run[edge]
         x = points[rows]
         side = ends[:, 1] - ends[:, 0]
         share = np.clip(np.einsum("nc,nc->n", x - ends[:, 0], side) / np.einsum("nc,nc->n", side, side), 0.0, 1.0)
@@ -162,9 +173,9 @@ class PartSearch:
 
     def _run_beside(self, edge: Int) -> Int:
         """How the triangle of the other part runs along edges."""
-        _, curve, at, _, part, other, run = self._edges
-        known = {(int(c), float(a), int(p)): int(r) for c, a, p, r in zip(curve, at[:, 0], part, run)}
-        return np.array([known[int(curve[e]), float(at[e, 0]), int(other[e])] for e in edge.tolist()], np.int64)
+        own = self._edges
+        known = {(int(c), float(a), int(p)): int(r) for c, a, p, r in zip(own.curve, own.at[:, 0], own.part, own.run)}
+        return np.array([known[int(own.curve[e]), float(own.at[e, 0]), int(own.other[e])] for e in edge.tolist()], np.int64)
 
     def _sorted_normals(self, part: Int, points: Float) -> Float:
         out = np.empty_like(points)
