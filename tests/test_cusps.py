@@ -192,14 +192,19 @@ def line_and_circle() -> None:
     geo.synchronize()
 
 
-def circles() -> None:
-    """Half of the gap between circles of radius 2 and 1 that touch inside."""
+def circles(r: float = 1.0) -> None:
+    """Half of the gap between circles of radius 2 and r that touch inside."""
     geo = gmsh.model.geo
-    p = [geo.addPoint(*x, 0) for x in ((0, 0), (2, 0), (4, 0), (1, 0), (2, 2), (1, 1))]
+    p = [geo.addPoint(*x, 0) for x in ((0, 0), (2, 0), (4, 0), (r, 0), (2, 2), (r, r), (2 * r, 0))]
     outer = [geo.addCircleArc(p[0], p[1], p[4]), geo.addCircleArc(p[4], p[1], p[2])]
-    inner = [geo.addCircleArc(p[0], p[3], p[5]), geo.addCircleArc(p[5], p[3], p[1])]
-    geo.addPlaneSurface([geo.addCurveLoop([*inner, geo.addLine(p[1], p[2]), -outer[1], -outer[0]])])
+    inner = [geo.addCircleArc(p[0], p[3], p[5]), geo.addCircleArc(p[5], p[3], p[6])]
+    geo.addPlaneSurface([geo.addCurveLoop([*inner, geo.addLine(p[6], p[2]), -outer[1], -outer[0]])])
     geo.synchronize()
+
+
+def near_circles() -> None:
+    """The same with a gap that grows by a ninth of the bend."""
+    circles(1.8)
 
 
 def cylinder() -> None:
@@ -212,7 +217,7 @@ def cylinder() -> None:
     occ.synchronize()
 
 
-@pytest.mark.parametrize("build", [line_and_circle, circles, cylinder])
+@pytest.mark.parametrize("build", [line_and_circle, circles, near_circles, cylinder])
 def test_models_with_cusps_are_meshed(build: Callable[[], None]) -> None:
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)

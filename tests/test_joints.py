@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 import gmsh_crossquad
+from gmsh_crossquad.cad.background import background_meshes
+from gmsh_crossquad.cad.bending import edge_bending
 from gmsh_crossquad.cad.read import read_model
 from gmsh_crossquad.errors import InputError
+from gmsh_crossquad.field.surface_mesh import SurfaceMesh
 from gmsh_crossquad.fill.high_order import GRID, turned_over
 from gmsh_crossquad.options import MeshOptions
 from gmsh_crossquad.records import Float, Int
@@ -163,6 +166,33 @@ def test_nodes_beside_a_blunt_edge_are_on_the_faces():
     assert len(result.ignored_curves) == 1
     x = places()[1:]
     np.testing.assert_allclose(x[:, 2], np.maximum(x[:, 0], 0.0) * math.tan(math.radians(15.0)), atol=1e-12)
+
+
+def test_bending_is_that_of_the_nearest_part():
+    two_halves()
+    model = read_model(MeshOptions(feature_angle=20.0))
+    (mesh,) = background_meshes(model, MeshOptions())
+    edges = SurfaceMesh(mesh.points, mesh.triangles).edges
+    along = np.diff(mesh.points[edges], axis=1)[:, 0]
+    axial = along[:, 2] ** 2 / (along**2).sum(axis=1)
+    out = edge_bending(model, mesh) / model.faces[0].extent
+    side = np.sign(out[np.abs(out[:, 0]).argmax(), 0])
+    curvature = side * model.scale  # of radius 1, in scaled units
+    np.testing.assert_allclose(out[:, 0], curvature * (1 - axial), atol=0.06 * model.scale)
+    np.testing.assert_allclose(out[:, 0] + out[:, 1], curvature, rtol=1e-5)
+
+
+def test_singular_points_on_different_parts():
+    rounded_box()
+    x, y, z = BOX
+    wanted = [(x / 2, y / 2, 0), (x / 2, y / 2, z), (0, y / 2, z / 2), (x, y / 2, z / 2)]
+    wanted += [(x / 2, side, h) for side in (0, y) for h in (z / 4, 3 * z / 4)]
+    text = ",".join(f"({a},{b},{c}):1" for a, b, c in wanted)
+    (field,) = gmsh_crossquad.cross_field(feature_angle=20.0, field=f"singularities:{text}").faces
+    found = field.points[np.flatnonzero(field.index)]
+    assert len(found) == 8
+    for place in wanted:
+        assert np.linalg.norm(found - place, axis=1).min() < 1e-9
 
 
 @pytest.mark.parametrize(("bent", "angle", "smooth"), [(10, 20, True), (10, 5, False), (-10, 20, True), (172, 20, False)])

@@ -118,8 +118,13 @@ class JoinedSurfaces:
     def normals(self, face: Int, points: Float) -> Float:
         """Unit normals on the side of the background triangles; as `CadSurfaces.normals`."""
         face, points = np.asarray(face, np.int64), np.asarray(points, float)
-        part = self.part(face, points)[0]
-        return self._split[0].normals(part, points) * np.where(self._turned[part], -1.0, 1.0)[:, None]
+        inner, first = self._split
+        part = first[face]
+        for row, search in self._searches.items():  # close to a joint the normals of both parts are much the same
+            rows = np.flatnonzero(face == row)
+            if len(rows):
+                part[rows] += search.about(points[rows])[0]
+        return inner.normals(part, points) * np.where(self._turned[part], -1.0, 1.0)[:, None]
 
     @cached_property
     def _turned(self) -> Bool:

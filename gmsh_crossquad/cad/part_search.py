@@ -17,6 +17,7 @@ import gmsh
 import numpy as np
 
 from ..records import Bool, Float, Int, Parts
+from .charts import runs
 from .facets import Facets
 from .session import gmsh_errors
 
@@ -26,6 +27,7 @@ RINGS = 2  # of points around a joint at which the nearest point alone does not 
 CLOSE = 3.0  # times the height of the arcs over their chords
 NEAREST = 4  # edges that are tried
 ROUNDS = 8
+PRECISION = 1e-9  # of an edge
 
 
 class _Edges(NamedTuple):
@@ -38,6 +40,7 @@ class _Edges(NamedTuple):
     part: Int
     other: Int
     run: Int  # 1 where the triangle of the part runs with the curve, -1 where against it
+    beside: Int  # the same of the other part
 
 
 @dataclass(frozen=True)
@@ -73,21 +76,25 @@ class PartSearch:
         place : (n, 3) float64
             That point, scaled; only where `on_joint`.
         """
+        part, unsure, foot = self.about(points)
+        on_joint, place = np.zeros(len(points), bool), np.zeros_like(points)
+        if len(unsure):
+            away = np.linalg.norm(foot - points[unsure], axis=1)
+            edge, distance = self._nearest_edge(foot, part[unsure])
+            close = distance < CLOSE * (away + self._edges.height[edge]) + 1e-12
+            self._decide(points, unsure[close], edge[close], part, on_joint, place)
+        return part, on_joint, place
+
+    def about(self, points: Float) -> tuple[Int, Int, Float]:
+        """Parts (n,) of the nearest triangles, the rows (k,) of the points near joints and their feet (k, 3) on the triangles."""
         tree, owner, doubtful = self._points
         near = np.asarray(tree.query(points)[1], np.int64).reshape(-1)
         part = owner[near]
-        on_joint, place = np.zeros(len(points), bool), np.zeros_like(points)
         unsure = np.flatnonzero(doubtful[near])
-        if not len(unsure):
-            return part, on_joint, place
         facets, triangle_part = self._facets
         foot, triangle, _ = facets.nearest(points[unsure])
         part[unsure] = triangle_part[triangle]
-        away = np.linalg.norm(foot - points[unsure], axis=1)
-        edge, distance = self._nearest_edge(foot, part[unsure])
-        close = distance < CLOSE * (away + self._edges.height[edge]) + 1e-12
-        self._decide(points, unsure[close], edge[close], part, on_joint, place)
-        return part, on_joint, place
+        return part, unsure, foot
 
     @cached_property
     def _points(self) -> tuple[Any, Int, Bool]:
@@ -118,25 +125,37 @@ class PartSearch:
         ends = np.concatenate([p[e] for p, e in zip(parts.points, parts.edges, strict=True)])
         curve, at, other = np.concatenate(parts.curve), np.concatenate(parts.at), np.concatenate(parts.other)
         part = np.repeat(np.arange(len(parts.edges), dtype=np.int64), [len(e) for e in parts.edges])
-        runs = []
+        along = []
         for triangles, edges, points in zip(parts.triangles, parts.edges, parts.points, strict=True):
             half = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
             forward = np.isin(edges[:, 0] * len(points) + edges[:, 1], half[:, 0] * len(points) + half[:, 1])
-            runs.append(np.where(forward, 1, -1).astype(np.int64))
+            along.append(np.where(forward, 1, -1).astype(np.int64))
         middle, _ = self._curve_points(curve, at.mean(axis=1))
         height = np.linalg.norm(middle - ends.mean(axis=1), axis=1)
-        return _Edges(ends, curve, at, height, part, other, np.concatenate(runs))
+        run = np.concatenate(along)
+        # every edge is there once for each of its parts
+        order = np.lexsort((part, at[:, 0], curve))
+        beside = np.empty(len(run), np.int64)
+        beside[order] = run[order].reshape(-1, 2)[:, ::-1].ravel()
+        return _Edges(ends, curve, at, height, part, other, run, beside)
+
+    @cached_property
+    def _trees(self) -> list[tuple[Any, Int]]:
+        """Trees of the middles of the edges of every part, and their rows."""
+        from ..spatial import cKDTree
+
+        own = self._edges
+        rows = [np.flatnonzero(own.part == p) for p in range(len(self.parts.points))]
+        return [(cKDTree(own.ends[mine].mean(axis=1)), mine) for mine in rows]
 
     def _nearest_edge(self, points: Float, part: Int) -> tuple[Int, Float]:
         """The nearest edge of the joints of each point's part, and its distance."""
-        from ..spatial import cKDTree
-
-        ends, owner = self._edges.ends, self._edges.part
+        ends = self._edges.ends
         edge, distance = np.zeros(len(points), np.int64), np.full(len(points), np.inf)
         for p in np.unique(part).tolist():
-            mine, rows = np.flatnonzero(owner == p), np.flatnonzero(part == p)
-            k = min(NEAREST, len(mine))
-            near = mine[cKDTree(ends[mine].mean(axis=1)).query(points[rows], k=k)[1].reshape(len(rows), k)]
+            tree, mine = self._trees[p]
+            rows, k = np.flatnonzero(part == p), min(NEAREST, len(mine))
+            near = mine[tree.query(points[rows], k=k)[1].reshape(len(rows), k)]
             a, side = ends[near, 0], ends[near, 1] - ends[near, 0]
             offset = points[rows][:, None] - a
             t = np.clip(np.einsum("nkc,nkc->nk", offset, side) / np.einsum("nkc,nkc->nk", side, side), 0.0, 1.0)
@@ -156,26 +175,23 @@ class PartSearch:
         share = np.clip(np.einsum("nc,nc->n", x - ends[:, 0], side) / np.einsum("nc,nc->n", side, side), 0.0, 1.0)
         t, width = at[:, 0] + share * (at[:, 1] - at[:, 0]), at[:, 1] - at[:, 0]
         low, high = self._ranges(curve)
-        for _ in range(ROUNDS):
-            foot, slope = self._curve_points(curve, t)
-            step = np.einsum("nc,nc->n", x - foot, slope) / np.maximum(np.einsum("nc,nc->n", slope, slope), 1e-300)
-            t = np.clip(t + step, np.maximum(low, at[:, 0] - width), np.minimum(high, at[:, 1] + width))
+        low, high = np.maximum(low, at[:, 0] - width), np.minimum(high, at[:, 1] + width)
         foot, slope = self._curve_points(curve, t)
+        for _ in range(ROUNDS):
+            step = np.einsum("nc,nc->n", x - foot, slope) / np.maximum(np.einsum("nc,nc->n", slope, slope), 1e-300)
+            before, t = t, np.clip(t + step, low, high)
+            foot, slope = self._curve_points(curve, t)
+            if np.all(np.abs(t - before) <= PRECISION * width):
+                break
         slope /= np.maximum(np.linalg.norm(slope, axis=1), 1e-300)[:, None]
         inner = []
-        for p, sign in ((owner, run), (other, self._run_beside(edge))):
+        for p, sign in ((owner, run), (other, e.beside[edge])):
             inward = np.cross(self._sorted_normals(p, foot), slope) * sign[:, None]
             inner.append(np.einsum("nc,nc->n", x - foot, inward) > 0)
         here, there = inner
         part[rows] = np.where(there & ~here, other, owner)
         ridge = ~here & ~there
         on_joint[rows], place[rows] = ridge, foot
-
-    def _run_beside(self, edge: Int) -> Int:
-        """How the triangle of the other part runs along edges."""
-        own = self._edges
-        known = {(int(c), float(a), int(p)): int(r) for c, a, p, r in zip(own.curve, own.at[:, 0], own.part, own.run)}
-        return np.array([known[int(own.curve[e]), float(own.at[e, 0]), int(own.other[e])] for e in edge.tolist()], np.int64)
 
     def _sorted_normals(self, part: Int, points: Float) -> Float:
         out = np.empty_like(points)
@@ -194,8 +210,9 @@ class PartSearch:
     def _curve_points(self, curve: Int, t: Float) -> tuple[Float, Float]:
         """Scaled points (n, 3) and derivatives (n, 3) of curves."""
         points, slopes = np.empty((len(t), 3)), np.empty((len(t), 3))
-        for tag in np.unique(curve).tolist():
-            rows = curve == tag
+        order = np.argsort(curve, kind="stable")
+        for tag, span in runs(curve[order]):
+            rows = order[span]
             with gmsh_errors("evaluating", entity=(1, tag)):
                 points[rows] = gmsh.model.getValue(1, tag, t[rows]).reshape(-1, 3)
                 slopes[rows] = gmsh.model.getDerivative(1, tag, t[rows]).reshape(-1, 3)
