@@ -144,9 +144,10 @@ def divisible_together(
     proved = bool(np.any(mismatch(model, glued, [c for c in known if len(c.options) == 1], weight)))
     tried: set[bytes] = set()
     for _ in range(MOST_TRIALS):
-        if missing.tobytes() in tried:  # nothing else is left
+        key = np.sign(missing).tobytes()
+        if key in tried:  # nothing else is left
             break
-        tried.add(missing.tobytes())
+        tried.add(key)
         following = _with_pairs(model, meshes, now, glued, missing)
         if following is not None:
             other = glue(model, meshes, following.tmeshes)
