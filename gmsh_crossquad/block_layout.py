@@ -86,7 +86,8 @@ def _on_block_boundary(mesh: QuadMesh, twin: Int, curve: Int) -> Bool:
 def _cut_rings(mesh: QuadMesh, boundary: Bool, twin: Int, ahead: Int, straight: Int) -> None:
     """Mark a line across every block without corners: a ring is one block that is its own neighbour there.
 
-    The line starts at the CAD vertex with the lowest node, else at the lowest node, of the ring's boundary.
+    The line starts at the CAD vertex with the lowest node, else at the lowest node, of the ring's boundary.  A torus is cut
+    open first, along a line through its lowest node.
     """
     block = np.repeat(mesh.quad_block, 4)
     cornered = np.bincount(block, boundary & boundary[ahead], minlength=int(block.max(initial=-1)) + 1) > 0
@@ -96,6 +97,12 @@ def _cut_rings(mesh: QuadMesh, boundary: Bool, twin: Int, ahead: Int, straight: 
     cad = np.zeros(len(mesh.points), bool)
     cad[mesh.vertex_node[mesh.vertex_node >= 0]] = True
     for ring in np.flatnonzero(~cornered & (np.bincount(block, minlength=len(cornered)) > 0)).tolist():
+        if not boundary[block == ring].any():  # a torus: the first cut makes it a ring
+            mine = np.flatnonzero(block == ring)
+            h = int(mine[np.argmin(node[mine])])
+            while not boundary[h]:
+                boundary[h] = boundary[twin[h]] = on_boundary[node[h]] = True
+                h = int(straight[h])
         across = np.flatnonzero((block == ring) & ~boundary & on_boundary[node])
         if not len(across):
             continue

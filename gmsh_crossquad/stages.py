@@ -29,6 +29,8 @@ from .layout.alone import divisible
 from .layout.arc_sizes import arc_sizes
 from .layout.face_tmesh import trace_face
 from .layout.glue import glue
+from .layout.quantize import Indivisible
+from .layout.together import divisible_together
 from .options import MeshOptions
 from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
 from .watch import Watch
@@ -125,6 +127,17 @@ class _Faces:
         meshes = tuple(replace(mesh, seed=np.full(len(mesh.points), -1, np.int64)) for mesh in self.meshes)
         return replace(self, meshes=meshes, notes=(*self.notes, "singular points may have moved a little in the mesh"))
 
+    def together(self, model: Model, error: Indivisible) -> _Faces | None:
+        """The same with pairs of singularities added so that the layouts have divisions together; None if they may have them."""
+        found = divisible_together(model, self.meshes, self.fields, self.tmeshes, error.cuts)
+        if found is None:
+            return None
+        notes = list(self.notes)
+        for f, pairs in sorted(found.pairs.items()):
+            what = "a pair of singularities was" if pairs == 1 else f"{pairs} pairs of singularities were"
+            notes.append(f"{what} added in surface {model.faces[f].tag}, since the faces could not be divided together")
+        return replace(self, fields=found.fields, tmeshes=found.tmeshes, notes=tuple(notes))
+
 
 def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult:
     """Mesh the current Gmsh model; returns records only.
@@ -147,6 +160,7 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         wanted = wishes(model, options)
     notes += model.notes
     faces: dict[tuple[float, Rule], _Faces] = {}
+    hopeless: set[tuple[float, Rule]] = set()
     seen: set[tuple[object, ...]] = set()
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
@@ -160,9 +174,26 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
             if key not in faces:
                 finer = replace(options, background=options.background * attempt.background)
                 faces[key] = _faces(model, finer, wanted, attempt.rule, watch, notes)
+            if key in hopeless:  # other sizes of blocks change nothing
+                continue
             found = faces[key] if attempt.pinned else faces[key].free()
             tried = replace(options, block_size=options.block_size * attempt.blocks)
-            made = _mesh(model, found, tried, attempt, watch, seen)
+            try:
+                made = _mesh(model, found, tried, attempt, watch, seen)
+            except Indivisible as error:
+                if wanted.given and attempt.rule != "divisible":  # first each face alone
+                    raise
+                try:
+                    with watch.stage("repair"):
+                        repaired = faces[key].together(model, error)
+                except Indivisible:
+                    hopeless.add(key)
+                    raise
+                if repaired is None:
+                    raise
+                faces[key] = repaired
+                found = faces[key] if attempt.pinned else faces[key].free()
+                made = _mesh(model, found, tried, attempt, watch, seen)
             if made is None:  # the layout of an earlier attempt
                 continue
             tmesh, coarse, result, mesh = made

@@ -219,22 +219,45 @@ def test_axes_are_the_coordinate_axes_in_the_plane():
     np.testing.assert_array_equal(read().faces[0].axes, np.eye(3)[:2])
 
 
-@pytest.mark.parametrize("shape", ["cylinder", "sphere", "dome"])
-def test_curved_faces_are_refused(shape):
+@pytest.mark.parametrize("shape", ["cylinder", "sphere", "torus", "dome"])
+def test_curved_faces(shape):
+    """Seams and poles are no curves of the model; areas are the kernel's."""
     occ = gmsh.model.occ
     if shape == "cylinder":
         occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
     elif shape == "sphere":
         occ.addSphere(0, 0, 0, 1)
+    elif shape == "torus":
+        occ.addTorus(0, 0, 0, 2, 0.5)
     else:  # its boundary is a plane circle
         occ.addSphere(0, 0, 0, 1, angle1=0)
     occ.synchronize()
     if shape == "dome":
         dome = next(f for _, f in gmsh.model.getEntities(2) if gmsh.model.getType(2, f) != "Plane")
         gmsh.model.addPhysicalGroup(2, [dome])
-    with pytest.raises(GeometryError, match="not planar") as caught:
-        read()
-    assert caught.value.entity[0] == 2
+    model = read()
+    loops = {"cylinder": 2, "sphere": 0, "torus": 0, "dome": 1}[shape]
+    curved = [face for face in model.faces if face.curved]
+    assert len(curved) == 1
+    assert len(curved[0].loops) == loops
+    assert len(model.curves) == loops
+    assert len(model.vertices) == loops
+    expected = {"cylinder": 2 * np.pi, "sphere": 4 * np.pi, "torus": 4 * np.pi**2, "dome": 2 * np.pi}[shape]
+    assert curved[0].area * model.scale**2 == pytest.approx(expected, rel=1e-6)
+    np.testing.assert_array_equal(curved[0].local(model.vertices), model.vertices)
+
+
+def test_a_seam_in_a_physical_group_is_kept():
+    tag = gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
+    gmsh.model.occ.synchronize()
+    assert tag == 1
+    side = next(f for _, f in gmsh.model.getEntities(2) if gmsh.model.getType(2, f) != "Plane")
+    bound = [abs(c) for _, c in gmsh.model.getBoundary([(2, side)], combined=False, oriented=False)]
+    seam = next(c for c in bound if bound.count(c) == 2)
+    gmsh.model.addPhysicalGroup(1, [seam])
+    model = read()
+    face = next(face for face in model.faces if face.curved)
+    assert [model.curves[c].tag for c in face.embedded_curves] == [seam]
 
 
 def test_a_flat_spline_surface_is_planar():
@@ -246,10 +269,22 @@ def test_a_flat_spline_surface_is_planar():
     assert abs(area(model)) == pytest.approx(6.0, rel=1e-6)
 
 
-def test_a_slightly_bent_face_is_refused():
+def test_a_plane_surface_with_a_bent_boundary():
     built_in([(0, 0, 0), (1, 0, 0), (1, 1, 1e-4), (0, 1, 0)], [[0, 1, 2, 3]])
+    assert read().faces[0].curved
+
+
+def test_a_plane_surface_far_from_any_plane_is_refused():
+    built_in([(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0)], [[0, 1, 2, 3]])
     with pytest.raises(GeometryError, match="not planar"):
         read()
+
+
+def test_a_curve_without_length_is_a_point():
+    built_in([(0, 0, 0), (1, 0, 0), (1, 1e-11, 0), (1, 1, 0), (0, 1, 0)], [[0, 1, 2, 3, 4]])
+    model = read()
+    assert len(model.curves) == 4
+    assert len(model.vertices) == 4
 
 
 # ---- loops

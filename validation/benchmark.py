@@ -1,7 +1,8 @@
 """Prints what meshing costs: start-up, a million quads against Gmsh's own binary write, alignment against one factorisation, and
-models of many blocks.
+models of many blocks and of many curved faces.
 
     python validation/benchmark.py > table.md
+    python validation/benchmark.py assemblies  # one of the tables
 
 Times are CPU seconds (one thread), the least of several runs; every row has a process of its own.  Machines differ: compare
 within a run, above all the ratio to the time that Gmsh takes to write the same mesh to a binary .msh file.
@@ -21,6 +22,7 @@ GEO = HERE.parent.parent / "geo"
 RUNS = 3
 SIZES = (0.0195, 0.00617, 0.001932)  # 10^4, 10^5, 10^6 quads on the plate with a hole
 HOLES = (1, 2, 4, 6, 8)  # per side
+COPIES = (1, 10, 32, 100)  # of a part with ten faces
 TRIANGLES = (0.38, 0.12)  # factors on the background of a plate with five holes: 10^4 and 10^5 triangles
 
 
@@ -207,14 +209,60 @@ def blocks() -> None:
     table("Many blocks: plates of two materials with holes", ("holes", "blocks", "quads", "CPU s", "min SJ", "slowest"), rows)
 
 
+def assembly(copies: str) -> None:
+    """Mesh copies of a block with four rounded edges (six plane faces, four quarter cylinders); prints the times as JSON."""
+    import gmsh
+
+    import gmsh_crossquad as cq
+
+    gmsh.initialize(readConfigFiles=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    occ = gmsh.model.occ
+    occ.addBox(0, 0, 0, 1, 1, 1)
+    occ.synchronize()
+    cq.mesh(size=0.3)  # everything is loaded
+    gmsh.clear()
+    block = occ.addBox(0, 0, 0, 2, 1, 0.6)
+    occ.synchronize()
+    height = {
+        tag: gmsh.model.getBoundingBox(1, tag)[5] - gmsh.model.getBoundingBox(1, tag)[2] for _, tag in gmsh.model.getEntities(1)
+    }
+    part = occ.fillet([block], [tag for tag, h in height.items() if h > 0.5], [0.25])
+    for k in range(1, int(copies)):
+        occ.translate(occ.copy(part), 3.0 * (k % 10), 2.0 * (k // 10), 0)
+    occ.synchronize()
+    faces = len(gmsh.model.getEntities(2))
+    start = time.process_time()
+    result = cq.mesh(size=0.1)
+    seconds = time.process_time() - start
+    q = result.quality
+    assert q.conforming and q.inverted == 0
+    slow = sorted(result.timings.items(), key=lambda item: -item[1])[:6]
+    stages = ", ".join(f"{name} {1e3 * t / faces:.1f}" for name, t in slow)
+    numbers = {"faces": faces, "blocks": q.blocks, "quads": q.quads, "min": q.min_scaled_jacobian}
+    print(json.dumps(numbers | {"seconds": seconds, "stages": stages}))
+
+
+def assemblies() -> None:
+    rows = []
+    for n in COPIES:
+        r, _ = child("assembly", str(n))
+        each = f"{1e3 * r['seconds'] / r['faces']:.0f}"
+        rows.append((f"{r['faces']:,}", r["blocks"], f"{r['quads']:,}", r["seconds"], each, f"{r['min']:.2f}", r["stages"]))
+    head = ("faces", "blocks", "quads", "CPU s", "ms a face", "min SJ", "slowest, ms a face")
+    table("Many curved faces: copies of a block with rounded edges", head, rows)
+
+
+TABLES = (start_up, million, alignment, blocks, assemblies)
+
 if __name__ == "__main__":
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     if len(sys.argv) == 3:
         time.perf_counter = time.process_time  # stages in CPU seconds
-        {"plate": plate, "perforated": perforated, "align": align}[sys.argv[1]](sys.argv[2])
+        {"plate": plate, "perforated": perforated, "align": align, "assembly": assembly}[sys.argv[1]](sys.argv[2])
+    elif len(sys.argv) == 2:
+        {f.__name__: f for f in TABLES}[sys.argv[1]]()
     else:
         print("# Benchmark\n\n    python validation/benchmark.py\n\nCPU seconds, the least of several runs (see the script).")
-        start_up()
-        million()
-        alignment()
-        blocks()
+        for make in TABLES:
+            make()

@@ -88,7 +88,7 @@ def face_meshes(
         if rows:
             out.update(zip(rows, _plane_meshes(model, rows, spacing, sizes, points), strict=True))
         curved = [row for row in range(len(model.faces)) if row not in out]
-        out.update(zip(curved, curved_meshes(model, curved, spacing, sizes), strict=True))
+        out.update(zip(curved, curved_meshes(model, curved, spacing, sizes, points), strict=True))
     return tuple(out[row] for row in range(len(model.faces)))
 
 

@@ -26,6 +26,8 @@ from .seeds import InnerPoints, inner_points
 __all__ = ["curve_spacing", "face_sizes"]
 
 DIVISIONS, FEW_DIVISIONS = 40.0, 16.0  # of a face's diameter in a model of up to MANY faces, and of very many
+FEWER_DIVISIONS = 11.0  # of very many, some of them curved
+CURVED = 0.7  # of these on a curved face, whose field takes four times as long and whose extent is measured in space
 MANY = 10
 DIRECTIONS = np.stack([np.cos(np.pi / 16 * np.arange(16)), np.sin(np.pi / 16 * np.arange(16))], axis=1)  # to measure diameters
 TRIANGLES, FACE_TRIANGLES = 3000.0, 100.0  # wanted in the model, and at least in a face, where there are many
@@ -59,12 +61,13 @@ def face_sizes(model: Model, options: MeshOptions) -> Float:
     (f,) float64, scaled
     """
     out = np.zeros(len(model.faces))
-    divisions = max(FEW_DIVISIONS, DIVISIONS * min(1.0, float(np.sqrt(MANY / max(1, len(model.faces))))))
+    few = FEWER_DIVISIONS if any(face.curved for face in model.faces) else FEW_DIVISIONS
+    divisions = max(few, DIVISIONS * min(1.0, float(np.sqrt(MANY / max(1, len(model.faces))))))
     wanted = max(FACE_TRIANGLES, TRIANGLES / len(model.faces))
     for row, face in enumerate(model.faces):
         if face.curved:
             even = np.sqrt(2.3 * face.area / wanted) if np.isfinite(face.area) else np.inf
-            out[row] = max(face.extent / divisions, min(face.extent / 8.0, even))
+            out[row] = max(face.extent / (CURVED * divisions), min(face.extent / 8.0, even))
             continue
         area, low, high = 0.0, np.full(len(DIRECTIONS), np.inf), np.full(len(DIRECTIONS), -np.inf)
         for loop in face.loops:

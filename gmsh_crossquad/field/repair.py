@@ -18,19 +18,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..records import AlignedField, CrossField, FaceMesh, Int
+from ..records import AlignedField, CrossField, FaceMesh, Float, Int
 from .align import Aligner, with_parts
 from .clearance import Clearance
 from .flux import vanish_flux
 from .operators import FieldOperators
 from .pair import add_pair
-from .singularities import singular_vertices
+from .singularities import move_index, shortest_path, singular_vertices
 from .surface_mesh import SurfaceMesh
+from .tangents import length
 
-__all__ = ["alternatives"]
+__all__ = ["alternatives", "with_pairs"]
 
 _PAIRS = 3
 _PARTS = (0.5, 0.25, 0.0)
+#: edges between two partners of a pair that is put at given places, at least
+_APART = 2
 
 
 def alternatives(mesh: FaceMesh, aligned: AlignedField, held: Int, *, move: bool = True) -> Iterator[AlignedField]:
@@ -69,6 +72,47 @@ def alternatives(mesh: FaceMesh, aligned: AlignedField, held: Int, *, move: bool
             found = vanish_flux(aligner, clearance, harmonic, held.tolist(), mesh.port, part)
             steps = np.stack([found.start, found.end], axis=1)
             yield _finished(aligner, found.field, aligned, moved=steps[steps[:, 0] != steps[:, 1]])
+
+
+def with_pairs(mesh: FaceMesh, aligned: AlignedField, places: Float) -> AlignedField | None:
+    """The field with pairs of opposite singularities at given places, otherwise rotated by as little as possible.
+
+    Parameters
+    ----------
+    mesh : FaceMesh
+    aligned : AlignedField
+        Of that mesh.
+    places : (k, 2, d) float64
+        Where the +1/4 and the -1/4 of every pair should be; they go to the nearest regular vertices.
+
+    Returns
+    -------
+    AlignedField or None
+        Checked, with the new vertices in its `added`; None where there is no room for the pairs.
+    """
+    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    aligner = Aligner(surface, FieldOperators(surface), aligned.index)
+    free = ~(surface.boundary_vertex | mesh.port)
+    free[singular_vertices(surface, aligned.field.rotation)[0]] = False
+    rotation = aligned.field.rotation.copy()
+    added: list[int] = []
+    for plus, minus in places:
+        ends = []
+        for place in (plus, minus):
+            inside = np.flatnonzero(free)
+            if not len(inside):
+                return None
+            ends.append(int(inside[np.argmin(length(mesh.points[inside] - place))]))
+            free[ends[-1]] = False
+        target = np.zeros(len(mesh.points), bool)
+        target[ends[0]] = True
+        path = shortest_path(surface, ends[1:], target, free | target, len(mesh.points))
+        if len(path) < _APART + 1:
+            return None
+        move_index(surface, rotation, path, 1)
+        added += ends
+    field = aligner.rotate(replace(aligned.field, rotation=rotation), aligned.field.rotation).field
+    return _finished(aligner, field, aligned, added=np.array(added))
 
 
 def _tools(surface: SurfaceMesh, aligned: AlignedField) -> tuple[Aligner, Clearance]:

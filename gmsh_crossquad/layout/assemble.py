@@ -136,6 +136,8 @@ def assemble(
 
 def _junction(through: list[Half], stem: Half, left: bool) -> Ring:
     """Arcs around a T-junction: those of the trace through it, back and onward, and a stem on its left or right."""
+    if len(through) != 2:
+        raise LayoutError("a separatrix ends where no other one passes", remedy="another field or a finer background may help")
     back, onward = through
     if left:
         return [(onward, 1), (stem, 1), (back, 2)]

@@ -89,7 +89,8 @@ class IntegerProgram:
             np.asarray(value, float),
         )
 
-    def _relaxation(self) -> tuple[Float, float] | None:
+    def relaxation(self) -> tuple[Float, float] | None:
+        """Columns and cost of the best solution that need not be whole; None if there is none."""
         self._solver.run()
         if self._solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
             return None
@@ -100,7 +101,7 @@ class IntegerProgram:
 
     def solve(self) -> Solution | None:
         """A good integer solution, or None when none was found within `MAX_PROGRAMS` linear programs."""
-        found = self._relaxation()
+        found = self.relaxation()
         if found is None:
             return None
         bound = found[1]
@@ -125,7 +126,7 @@ class IntegerProgram:
                 branch = other
             for j in branch.touched:
                 self._bound(j, low[j], high[j])
-            found = self._relaxation()
+            found = self.relaxation()
             programs += 1
         for j in {j for entry in stack for j in entry.touched}:
             self._bound(j, 0.0, float(self._upper[j]))

@@ -24,12 +24,13 @@ from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
 from .alignment import alignment
 from .arc_bends import arc_bends
+from .conditions import at_least, balance
 from .cuts import Cut, separation_cuts
 from .handles import handle_cuts, homology
 from .quotient import quotient
 from .separable import SeparableProgram, parts_of_arcs
 
-__all__ = ["Quantization", "quantize"]
+__all__ = ["Indivisible", "Quantization", "quantize"]
 
 MAX_ROUNDS = 60
 BEND = np.radians(90.0)
@@ -55,32 +56,16 @@ class Quantization:
     cost: float
 
 
-def _balance(tmesh: TMesh) -> sp.csr_array:
-    """Rows of (sum of a side) - (sum of the opposite side) for every patch."""
-    rows, columns, values = [], [], []
-    k = 0
-    for sides in tmesh.patches:
-        for i in (0, 1):
-            for j, sign in ((i, 1.0), (i + 2, -1.0)):
-                for arc, _ in sides[j]:
-                    rows.append(k)
-                    columns.append(arc)
-                    values.append(sign)
-            k += 1
-    return sp.csr_array((values, (rows, columns)), shape=(k, len(tmesh.length)))
+class Indivisible(LayoutError):
+    """No divisions meet all conditions.
 
+    Attributes
+    ----------
+    cuts : tuple of Cut
+        Separation cuts that were met before.
+    """
 
-def _at_least(tmesh: TMesh, model: Model) -> list[Cut]:
-    """Minimum divisions of CAD curves and boundary loops, as cuts with one option."""
-    out = []
-    for curve, pieces in zip(model.curves, tmesh.pieces):
-        out.append(Cut(((tuple((arc, 1) for arc in pieces), 3 if curve.closed else 1),)))
-    for _, arcs in tmesh.loops:
-        count: dict[int, int] = {}
-        for arc in arcs:
-            count[arc] = count.get(arc, 0) + 1
-        out.append(Cut(((tuple(count.items()), 3),)))
-    return out
+    cuts: tuple[Cut, ...] = ()
 
 
 def quantize(
@@ -110,8 +95,10 @@ def quantize(
 
     Raises
     ------
+    Indivisible
+        No divisions were found that meet all conditions.
     LayoutError
-        No divisions exist that meet all conditions.
+        The cuts did not come to an end.
     """
     n_arcs = len(tmesh.length)
     target = np.array(target, float)
@@ -148,8 +135,8 @@ def quantize(
         )
         start, column = matrix.indptr[:-1].astype(np.int64), matrix.indices.astype(np.int64)
         program.add_rows(-slack - shift, slack - shift, start, column, matrix.data)
-    balance = _balance(tmesh)
-    add(balance, np.zeros(balance.shape[0]), np.zeros(balance.shape[0]))
+    sums = balance(tmesh)
+    add(sums, np.zeros(sums.shape[0]), np.zeros(sums.shape[0]))
     for bounds, equal in ((exact or {}, True), (at_most or {}, False)):
         if bounds:
             row = np.concatenate([np.full(len(tmesh.pieces[c]), i) for i, c in enumerate(bounds)])
@@ -159,19 +146,21 @@ def quantize(
             add(sums, count if equal else np.full(len(count), -np.inf), count)
 
     classes = homology(model, tmesh)
-    known: set[Cut] = set()
-    new = _at_least(tmesh, model)
-    n_base = len(set(new))
+    known: dict[Cut, None] = {}
+    new = at_least(tmesh, model)
+    base = set(new)
     big = largest + float(floor.max(initial=0.0))
     for round_ in range(1, MAX_ROUNDS + 1):
-        known.update(new)
+        known.update(dict.fromkeys(new))
         _add_cuts(program, new if disjunctions else [Cut(c.options[:1]) for c in new], expand, floor, big, part)
         solution = program.solve()
         if solution is None:
-            raise LayoutError(
+            error = Indivisible(
                 f"no divisions of the layout ({len(tmesh.patches)} patches) keep all corners and singularities apart",
                 remedy="another size, or fewer short curves, may help",
             )
+            error.cuts = tuple(cut for cut in known if cut not in base)
+            raise error
         divisions = (floor + expand @ solution.values[: len(arc)]).astype(np.int64)
         found = quotient(tmesh, divisions)
         new = [c for c in separation_cuts(tmesh, found) or handle_cuts(tmesh, found, classes) if c not in known]
@@ -182,7 +171,7 @@ def quantize(
             )
         if not new:
             total = float(_cost(target, divisions.astype(float)).sum())
-            return Quantization(divisions, round_, len(known) - n_base, total)
+            return Quantization(divisions, round_, len(known) - len(base), total)
     raise LayoutError(f"the quantization did not settle in {MAX_ROUNDS} rounds", remedy="another size may help")
 
 

@@ -80,7 +80,7 @@ def _quick(mesh: SurfaceMesh, theta: Float, known: Bool) -> Bool:
     turn = np.abs(from_angles(mesh, theta).rotation).max(axis=1)
     near = np.zeros(len(mesh.points), bool)
     near[mesh.triangles[(turn > COARSE_TURN) & known[mesh.triangle_edges].all(axis=1)]] = True
-    return near[mesh.edges].any(axis=1)
+    return near[mesh.edges[:, 0]] | near[mesh.edges[:, 1]]
 
 
 def _filled(mesh: SurfaceMesh, theta: Float, known: Bool) -> Float:
