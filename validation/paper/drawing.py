@@ -121,6 +121,32 @@ def field_scene(study: Study) -> Scene:
     return Scene((replace(build_field_scene(study.result.field).panels[0], title="given field"), *own.panels[1:]), own.extent)
 
 
+def gallery(studies: dict[str, Study]) -> Scene:
+    """The blocks and quads of several results, all of one size."""
+    panels = []
+    for name, study in studies.items():
+        layout, mesh = build_scene(study.result).panels[1:]
+        low, high = layout.points.min(axis=0), layout.points.max(axis=0)
+        middle, size = 0.5 * (low + high), float((high - low)[:2].max())
+
+        def moved(points: np.ndarray, middle: np.ndarray = middle, size: float = size) -> np.ndarray:
+            return (points - middle) / size
+
+        quality = study.result.quality
+        blocks = f"{quality.blocks} block" + ("s" if quality.blocks > 1 else "")
+        panels.append(
+            Panel(
+                f"{name}: {quality.quads} quads in {blocks}, scaled Jacobian min {quality.min_scaled_jacobian:.2f}",
+                moved(layout.points),
+                layout.cells,
+                layout.colours,
+                tuple(replace(x, segments=moved(x.segments)) for x in (mesh.lines[0], *layout.lines)),
+                tuple(replace(x, points=moved(x.points)) for x in layout.markers),
+            )
+        )
+    return Scene(tuple(panels), np.array([[-0.5, -0.5], [0.5, 0.5]]))
+
+
 def write(picture: Scene, path: Path) -> None:
     """Draw a scene; few colours keep the file small (more of them where surfaces are lit)."""
     from PIL import Image
@@ -130,7 +156,7 @@ def write(picture: Scene, path: Path) -> None:
         small = image.convert("RGB")
         factor = min(1.0, (PIXELS / (small.width * small.height)) ** 0.5)
         small = small.resize((round(factor * small.width), round(factor * small.height)), Image.Resampling.LANCZOS)
-        colours = SHADES if len(np.unique(picture.panels[-2].colours, axis=0)) > COLOURS else COLOURS
+        colours = SHADES if max(len(np.unique(p.colours, axis=0)) for p in picture.panels[-2:-1]) > COLOURS else COLOURS
         own = small.quantize(colours).getpalette()
         assert own is not None
         palette = Image.new("P", (1, 1))

@@ -14,7 +14,7 @@ import gmsh_crossquad as cq
 from gmsh_crossquad.field.smooth import wrap
 from gmsh_crossquad.source.heat_frame import HeatFrame
 
-POINTS, QUARTERS = [(0.8, 0.3), (-0.5, 0.7), (-0.7, -0.5), (0.3, -0.8)], [1, 1, 1, 1]
+POINTS, QUARTERS = [(1.0, 0.3), (-0.2, 1.0), (-0.6, -0.6), (0.3, -0.4)], [1, 1, 1, 1]
 CHART = Chart(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
 FACTORS = (1.6, 0.6)
 

@@ -1,17 +1,26 @@
-// A plate with a smooth bump off its middle: one B-spline surface through the plate's sides and points on the bump.
+// A plate with a smooth bump beside its middle: a surface of revolution, tangent to the plate all around.
 SetFactory("OpenCASCADE");
-n = 12;
-For k In {0 : n}
-  y = -1 + 2 * k / n;
-  p = newp;
-  For i In {0 : n}
-    x = -1 + 2 * i / n;
-    s = ((x - 0.15)^2 + (y + 0.1)^2) / 0.16;
-    Point(p + i) = {x, y, 0.5 * Exp(-s) * (1 - x^2) * (1 - y^2)};
-  EndFor
-  Spline(1 + k) = {p : p + n};
-  Wire(1 + k) = {1 + k};
-EndFor
-ThruSections(1) = {1 : n + 1};
-Physical Surface("plate", 1) = {Surface{:}};
+x = 0.15;
+y = -0.1;
+r = 0.55;
+Point(1) = {x + r, y, 0};
+Point(2) = {x + 0.65 * r, y, 0};
+Point(3) = {x + 0.55 * r, y, 0.4};
+Point(4) = {x, y, 0.4};
+BSpline(1) = {1 : 4};
+Extrude { {0, 0, 1}, {x, y, 0}, 2 * Pi } { Curve{1}; }
+rim() = Curve In BoundingBox {x - 1.01 * r, y - 1.01 * r, -0.01, x + 1.01 * r, y + 1.01 * r, 0.01};
+Point(11) = {-1, -1, 0};
+Point(12) = {1, -1, 0};
+Point(13) = {1, 1, 0};
+Point(14) = {-1, 1, 0};
+Line(11) = {11, 12};
+Line(12) = {12, 13};
+Line(13) = {13, 14};
+Line(14) = {14, 11};
+Curve Loop(21) = {11 : 14};
+Curve Loop(22) = {rim()};
+Plane Surface(11) = {21, 22};
+Physical Surface("bump", 1) = {1};
+Physical Surface("plate", 2) = {11};
 Mesh.MeshSizeMax = 0.08;

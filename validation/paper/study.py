@@ -143,13 +143,15 @@ class Study:
     def four_sided(self) -> tuple[int, int]:
         """Number of blocks with exactly four corners, and of all blocks, from the quads alone.
 
-        A block has a corner where a quad has two edges in a row across which there is no quad of the block.
+        A block has a corner where a quad has two edges in a row across which there is no quad of the block.  One that meets
+        itself, two of its sides being the same, has none, and the Euler characteristic of a ring.
         """
         quads, block = self.result.mesh.quads, self.result.mesh.quad_block
         across = twins(quads)
         rim = ((across < 0) | (block[across // 4] != np.repeat(block, 4))).reshape(-1, 4)
         corners = np.bincount(block, (rim & np.roll(rim, 1, axis=1)).sum(axis=1))[np.unique(block)]
-        return int(np.sum(corners == 4)), len(corners)
+        good = [n == 4 or (n == 0 and _euler(quads[block == b]) == 0) for b, n in zip(np.unique(block), corners)]
+        return sum(good), len(corners)
 
     def worst_corner(self) -> float:
         """The least scaled Jacobian: the sine of a quad's corner in the plane of its diagonals."""
@@ -158,6 +160,12 @@ class Study:
         ahead, back = np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
         sine = np.einsum("qkc,qc->qk", np.cross(ahead, back), normal / np.linalg.norm(normal, axis=1)[:, None])
         return float((sine / np.linalg.norm(ahead, axis=2) / np.linalg.norm(back, axis=2)).min())
+
+
+def _euler(quads: npt.NDArray[np.int64]) -> int:
+    """Vertices less edges, plus quads."""
+    ends = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
+    return len(np.unique(quads)) - len(np.unique(np.sort(ends, axis=1), axis=0)) + len(quads)
 
 
 def solve(path: str, **options: Any) -> Study:
