@@ -1,4 +1,4 @@
-"""Figures 17, 18, 19: a field on a quarter of a sphere: parts of the unaligned field are not four-sided, of the aligned are, and its mesh.
+"""Figures 17, 18, 19: a quarter of a sphere; parts of the unaligned field are not four-sided, those of the aligned one are.
 
 The field is formula (2) in the plane of a stereographic projection, which keeps angles; it is given as directions in space.
 """
