@@ -25,7 +25,7 @@ from gmsh_crossquad.view.scene import (
     build_scene,
 )
 
-PIXELS, COLOURS, SHADES = 9e5, 60, 160
+PIXELS, COLOURS, SHADES = 8e5, 60, 150
 WIDEST = 1.75  # wider panels would be drawn below each other
 FOUR, OTHER = (205, 226, 240), (244, 190, 150)
 
@@ -115,10 +115,9 @@ def scene(study: Study, *more: Panel) -> Scene:
     return Scene(panels, np.stack([low - [0.0, missing / 2], high + [0.0, missing / 2]]))
 
 
-def field_scene(study: Study) -> Scene:
-    """The given field, and layout and mesh of the aligned one."""
-    own = scene(study)
-    return Scene((replace(build_field_scene(study.result.field).panels[0], title="given field"), *own.panels[1:]), own.extent)
+def given_panel(study: Study) -> Panel:
+    """The given field."""
+    return replace(build_field_scene(study.result.field).panels[0], title="given field")
 
 
 def gallery(studies: dict[str, Study]) -> Scene:
@@ -156,8 +155,9 @@ def write(picture: Scene, path: Path) -> None:
         small = image.convert("RGB")
         factor = min(1.0, (PIXELS / (small.width * small.height)) ** 0.5)
         small = small.resize((round(factor * small.width), round(factor * small.height)), Image.Resampling.LANCZOS)
-        colours = SHADES if max(len(np.unique(p.colours, axis=0)) for p in picture.panels[-2:-1]) > COLOURS else COLOURS
-        own = small.quantize(colours).getpalette()
+        lit = len(np.unique(picture.panels[-2].colours, axis=0)) > COLOURS
+        colours = SHADES if lit else COLOURS
+        own = small.quantize(colours, kmeans=2 if lit else 0).getpalette()
         assert own is not None
         palette = Image.new("P", (1, 1))
         palette.putpalette([c for colour in (BLUE, VERMILLION, INK) for c in colour] + own[: 3 * colours])

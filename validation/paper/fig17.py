@@ -8,7 +8,7 @@ from separatrices import formula, winding
 from sphere import Chart, on_sphere
 from study import Checks, check_boundary, check_faces, check_mesh, check_sum, four, main, model, solve
 
-POINTS, QUARTERS = [(0.5, 0.15), (-0.4, 0.05)], [1, 1]
+POINTS, QUARTERS = [(0.35, 0.45), (-0.55, -0.15)], [1, 1]
 CHART = Chart(np.array([0.0, 1.0, 1.0]) / np.sqrt(2), np.array([1.0, 0.0, 0.0]))
 
 
