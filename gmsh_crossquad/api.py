@@ -8,9 +8,9 @@ from typing import Any
 from .arguments import check_options
 from .cad.files import is_running
 from .cad.high_order import element_order, raise_order
+from .cad.joined_surfaces import cad_surfaces
 from .cad.put import put_mesh
 from .cad.session import MeshSnapshot, gmsh_errors, guest
-from .cad.surfaces import CadSurfaces
 from .errors import InputError
 from .face_field import face_field
 from .field_result import FieldResult
@@ -35,8 +35,9 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
     progress : callable, optional
         Called with the name of every stage when it starts.
     **options
-        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `order`, `incomplete`, `max_quads`,
-        `block_size`, `background`.  What is not given here may be set in the model, as ONELAB parameters "CrossQuad/...".
+        Further fields of `MeshOptions`: `field`, `boundary_index`, `fix_indices`, `relax`, `order`, `incomplete`,
+        `feature_angle`, `max_quads`, `block_size`, `background`.  What is not given here may be set in the model, as ONELAB
+        parameters "CrossQuad/...".
 
     Returns
     -------
@@ -68,7 +69,7 @@ def mesh(size: float | None = None, *, progress: Callable[[str], None] | None = 
             raised: tuple[str, ...] = ()
             if order > 1:
                 with watch.stage("order"):
-                    surfaces = CadSurfaces(stages.model, stages.meshes)
+                    surfaces = cad_surfaces(stages.model, stages.meshes)
                     raised = raise_order(stages.model, surfaces, stages.mesh, order, incomplete=incomplete)
         except BaseException:
             snapshot.restore()

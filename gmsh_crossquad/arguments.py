@@ -12,6 +12,7 @@ from .options import MeshOptions
 
 __all__ = ["check_options", "parse_extrusion"]
 
+LARGEST_ANGLE = 60.0
 _NAMES = tuple(f.name for f in dataclasses.fields(MeshOptions))
 
 
@@ -31,6 +32,8 @@ def check_options(**options: Any) -> MeshOptions:
     for name in ("size", "block_size", "background"):
         if name in options:
             options[name] = _positive(name, options[name])
+    if options.get("feature_angle") is not None:
+        options["feature_angle"] = _angle("feature_angle", options["feature_angle"])
     if "max_quads" in options:
         count = _positive("max_quads", options["max_quads"])
         if count != int(count):
@@ -68,6 +71,14 @@ def parse_extrusion(text: str) -> tuple[float | list[float], int]:
     if len(values) not in (1, 3) or count < 1 or not all(map(math.isfinite, values)) or not any(values):
         raise InputError(f"the extrusion is {text!r}", remedy=remedy)
     return values[0] if len(values) == 1 else values, count
+
+
+def _angle(name: str, value: Any) -> float | None:
+    """An angle in degrees; None for 0."""
+    number = 0.0 if value == 0 else _positive(name, value)
+    if number > LARGEST_ANGLE:
+        raise InputError(f"{name} is {number:g}", remedy=f"give degrees, at most {LARGEST_ANGLE:g}")
+    return number or None
 
 
 def _positive(name: str, value: Any) -> float:

@@ -55,6 +55,20 @@ def _parser() -> argparse.ArgumentParser:
         default=None,
         help="quads of order 2 with 8 nodes, not 9 (default: Mesh.SecondOrderIncomplete)",
     )
+    follow = mesh.add_mutually_exclusive_group()
+    follow.add_argument(
+        "--feature-angle",
+        type=float,
+        metavar="DEGREES",
+        help="do not follow curves across which the normals of faces differ by less (default: every curve is followed)",
+    )
+    follow.add_argument(
+        "--respect-all-curves",
+        action="store_const",
+        const=0.0,
+        dest="feature_angle",
+        help="follow every curve, whatever angle the model sets",
+    )
     mesh.add_argument(
         "--extrude",
         metavar="LENGTH:LAYERS",
@@ -100,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
         "check", help="judge a mesh", description="Print the quality of a mesh; exit status 1 if it is bad."
     )
     check.add_argument("mesh", help="mesh file that Gmsh reads")
+    check.add_argument("--feature-angle", type=float, metavar="DEGREES", help="as it was given to mesh")
     check.add_argument("--model", help="the model that it is a mesh of: compare boundary, area and groups too")
 
     for command in (mesh, field, check):
@@ -173,7 +188,8 @@ def _mesh(arguments: argparse.Namespace) -> int:
     from .formats import MESH_FORMATS, VOLUME_FORMATS
 
     sweep = parse_extrusion(arguments.extrude) if arguments.extrude is not None else None
-    values = _options(arguments, ("size", "max_quads", "block_size", "order", "incomplete", "field", "fix_indices", "relax"))
+    names = "size", "max_quads", "block_size", "order", "incomplete", "feature_angle", "field", "fix_indices", "relax"
+    values = _options(arguments, names)
     formats = MESH_FORMATS if sweep is None else VOLUME_FORMATS
     answer = _run_with_outputs("cli:mesh_task", arguments, values, formats, extrude=sweep)
     if not arguments.quiet:
@@ -359,6 +375,7 @@ def field_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, An
 
 
 def _check(arguments: argparse.Namespace) -> int:
+    from .arguments import check_options
     from .child import run
     from .formats import check_input
 
@@ -366,6 +383,7 @@ def _check(arguments: argparse.Namespace) -> int:
     if arguments.model:
         check_input(arguments.model)
     job = {"mesh": arguments.mesh, "model": arguments.model, "verbose": arguments.verbose}
+    job["feature_angle"] = check_options(feature_angle=arguments.feature_angle).feature_angle
     answer = run("judge:check_task", job, _display(arguments))
     if not arguments.quiet:
         print(answer["table"])

@@ -117,7 +117,7 @@ def _off_faces(points: Float, mesh: MeshArrays, model: Model, surfaces: Surfaces
     surface, then on any."""
     if not surfaces.curved.any() or not len(mesh.quads):
         return 0
-    row = {face.tag: f for f, face in enumerate(model.faces)}
+    row = {tag: f for f, face in enumerate(model.faces) for tag in face.tags}
     face = np.repeat([row.get(t, -1) for t in mesh.quad_entity.tolist()], 4)
     node, first = np.unique(mesh.quads.ravel(), return_index=True)
     face = face[first]

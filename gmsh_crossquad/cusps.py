@@ -8,18 +8,39 @@ little beyond the middle between their ends, and angles of 120 degrees in all co
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from .records import Bool, Curve, Float, Guide, Model
+from .records import Bool, Curve, Float, Guide, Int, Model
 
-__all__ = ["SHARP", "cusp_corners"]
+__all__ = ["SHARP", "Cusps", "cusp_corners", "find_cusps"]
 
 SHARP = float(np.radians(6.0))
 """Opening angle below which a corner counts as a cusp."""
 
 
-def cusp_corners(guide: Guide, model: Model) -> Bool:
+class Cusps(NamedTuple):
     """Corners of guide quads that lie in a cusp.
+
+    Attributes
+    ----------
+    quad, corner : (c,) int64
+        Corner k of a quad.
+    curve : (c, 2) int64
+        Curves along side k and side k - 1.
+    end : (c, 2) int64
+        0 where the cusp is the curve's start, 1 where it is its end.
+    """
+
+    quad: Int
+    corner: Int
+    curve: Int
+    end: Int
+
+
+def find_cusps(guide: Guide, model: Model) -> Cusps:
+    """Find the corners of guide quads at a CAD vertex between two curves that leave it less than `SHARP` apart.
 
     Parameters
     ----------
@@ -28,33 +49,30 @@ def cusp_corners(guide: Guide, model: Model) -> Bool:
 
     Returns
     -------
-    (q, 4) bool
-        The corner is at a CAD vertex, both edges beside it are on curves, and these leave the vertex in directions less than
-        `SHARP` apart.
+    Cusps
     """
-    out = np.zeros(guide.quads.shape, bool)
     n = len(guide.points)
-    keys, directions = [], []
-    for curve, chain in zip(model.curves, guide.chains):
-        if len(chain) > 1:
-            keys += [int(chain[0]) * n + int(chain[1]), int(chain[-1]) * n + int(chain[-2])]
-            directions.append(_leaving(curve))
-    if not keys:
-        return out
+    rows = [row for row, chain in enumerate(guide.chains) if len(chain) > 1]
+    keys = np.array([int(c[a]) * n + int(c[b]) for c in (guide.chains[r] for r in rows) for a, b in ((0, 1), (-1, -2))], np.int64)
+    away = np.concatenate([np.zeros((0, 3)), *(_leaving(model.curves[r]) for r in rows)])
     order = np.argsort(keys, kind="stable")
-    known, away = np.array(keys)[order], np.concatenate(directions)[order]
-    corner = guide.quads
-    at = np.flatnonzero((guide.cad_vertex[corner] >= 0).ravel())
+    known = keys[order]
+    at = np.flatnonzero((guide.cad_vertex[guide.quads] >= 0).ravel()) if len(keys) else np.zeros(0, np.int64)
     q, k = np.divmod(at, 4)
-    sides = []
-    on: Bool = np.ones(len(at), bool)
-    for other in ((k + 1) % 4, (k + 3) % 4):
-        key = corner[q, k] * n + corner[q, other]
-        row = np.minimum(np.searchsorted(known, key), len(known) - 1)
-        on &= known[row] == key
-        sides.append(away[row])
-    cosine = np.einsum("nc,nc->n", *sides)
-    out[q, k] = on & (cosine > np.cos(SHARP))
+    key = guide.quads[q, k][:, None] * n + guide.quads[q[:, None], (k[:, None] + [1, 3]) % 4]
+    place = np.minimum(np.searchsorted(known, key), len(known) - 1)
+    on = (known[place] == key).all(axis=1) if len(at) else np.zeros(0, bool)
+    place = order[place[on]]
+    sharp = np.einsum("nc,nc->n", away[place[:, 0]], away[place[:, 1]]) > np.cos(SHARP)
+    place = place[sharp]
+    return Cusps(q[on][sharp], k[on][sharp], np.array(rows, np.int64)[place // 2], place % 2)
+
+
+def cusp_corners(guide: Guide, model: Model) -> Bool:
+    """(q, 4) The corners of guide quads in cusps, from `find_cusps`."""
+    out = np.zeros(guide.quads.shape, bool)
+    cusps = find_cusps(guide, model)
+    out[cusps.quad, cusps.corner] = True
     return out
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .cusps import cusp_corners
 from .embed.place import place
 from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
@@ -138,7 +139,7 @@ def smooth_guide(
             with watch.stage("fill"):
                 bad, folded = poor_cells(model, surfaces, guide, fine, evaluate, vertices)
                 steep = steep_chords(model, surfaces, guide, fine)
-                if not len(bad) and surfaces.curved.any():
+                if not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any()):
                     fine, steep = _divided(model, surfaces, guide, fine, steep, evaluate, vertices)
         score = (-len(folded), -len(steep), report.min_scaled_jacobian)
         if best is None or score > best[0]:

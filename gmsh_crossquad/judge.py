@@ -31,23 +31,23 @@ def check_task(job: dict[str, Any], emit: Callable[[str], None]) -> dict[str, An
         if job["model"]:
             emit("open the model")
             open_model(job["model"])
-            report = _compared(report, mesh)
+            report = _compared(report, mesh, job.get("feature_angle"))
     return {"table": format_report(report, job["mesh"]), "faults": list(report.faults)}
 
 
-def _compared(report: Report, mesh: MeshArrays) -> Report:
+def _compared(report: Report, mesh: MeshArrays, feature_angle: float | None) -> Report:
     """The report with what is wrong with respect to the current Gmsh model."""
     from .cad.areas import curved_areas
     from .cad.background import background_meshes
     from .cad.files import physical_groups
+    from .cad.joined_surfaces import cad_surfaces
     from .cad.read import read_model
-    from .cad.surfaces import CadSurfaces
     from .options import MeshOptions
 
-    options = MeshOptions()
+    options = MeshOptions(feature_angle=feature_angle)
     model = read_model(options)
     if not any(face.curved for face in model.faces):
         return compare(report, mesh, model, Planes(model), physical_groups(), np.full(len(model.faces), np.nan))
     meshes = background_meshes(model, options)
-    surfaces = CadSurfaces(model, meshes)
+    surfaces = cad_surfaces(model, meshes)
     return compare(report, mesh, model, surfaces, physical_groups(), curved_areas(model, surfaces, meshes))

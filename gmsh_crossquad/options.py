@@ -40,6 +40,10 @@ class MeshOptions:
         Order of the elements; None takes `Mesh.ElementOrder`.
     incomplete : bool or None
         Quads of order 2 with 8 nodes instead of 9; None takes `Mesh.SecondOrderIncomplete`.
+    feature_angle : float or None
+        Degrees.  Faces whose normals differ by less everywhere on their common curve are meshed as one surface, and the curve is
+        not followed, unless it is in a physical group, transfinite, embedded or between different physical surfaces.  None
+        or 0: every curve is followed.
     """
 
     size: float | None = None
@@ -52,3 +56,4 @@ class MeshOptions:
     relax: bool | None = None
     order: int | None = None
     incomplete: bool | None = None
+    feature_angle: float | None = None

@@ -24,6 +24,7 @@ __all__ = [
     "Guide",
     "Int",
     "Model",
+    "Parts",
     "QuadMesh",
     "TMesh",
 ]
@@ -102,6 +103,10 @@ class Face:
         Rows of `Model.vertices` inside the face that are on no curve of it.
     area, extent : float, scaled
         Of a curved face its area (by the built-in kernel an estimate) and the diagonal of its box; NaN on plane ones.
+    parts : tuple of Face
+        The CAD faces, without loops, of which the face is made where it is several that meet in smooth joints; none elsewhere.
+    turned : bool
+        Of a part, whether its CAD normal is opposite to that of the whole.
     """
 
     tag: int
@@ -112,11 +117,18 @@ class Face:
     embedded_points: tuple[int, ...] = ()
     area: float = float("nan")
     extent: float = float("nan")
+    parts: tuple[Face, ...] = ()
+    turned: bool = False
 
     @property
     def curved(self) -> bool:
         """Whether the face is not known to be plane."""
         return len(self.axes) == 3
+
+    @property
+    def tags(self) -> tuple[int, ...]:
+        """Gmsh tags of the CAD faces that the face is made of."""
+        return tuple(part.tag for part in self.parts) or (self.tag,)
 
     @property
     def normal(self) -> Float:
@@ -161,6 +173,8 @@ class Model:
         Gmsh tag of every CAD point in a named physical group with the group's name, also of points of no wanted face.
     face_names : tuple of tuple of str
         Names of the physical surfaces that hold each face; empty where nobody has read them.
+    ignored_curves : tuple of int
+        Gmsh tags of the curves that are left out because faces go on smoothly across them.
     """
 
     name: str
@@ -174,6 +188,37 @@ class Model:
     notes: tuple[str, ...] = field(default=())
     point_names: tuple[tuple[int, str], ...] = ()
     face_names: tuple[tuple[str, ...], ...] = ()
+    ignored_curves: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The background triangles of a face that is made of several CAD faces, each by itself, and their joints.
+
+    Attributes
+    ----------
+    points : tuple of (n, 3) float64, scaled
+    triangles : tuple of (m, 3) int64
+        Oriented as the CAD normal of the part.
+    parameters : tuple of (n, 2) float64
+        CAD parameters on that part.
+    edges : tuple of (e, 2) int64
+        For every part its edges on joints, in the direction of the curve.
+    curve : tuple of (e,) int64
+        Gmsh tags of these curves.
+    at : tuple of (e, 2) float64
+        Parameters on the curve of the ends of the edges.
+    other : tuple of (e,) int64
+        Row of the part on the other side.
+    """
+
+    points: tuple[Float, ...]
+    triangles: tuple[Int, ...]
+    parameters: tuple[Float, ...]
+    edges: tuple[Int, ...]
+    curve: tuple[Int, ...]
+    at: tuple[Float, ...]
+    other: tuple[Int, ...]
 
 
 @dataclass(frozen=True)
@@ -206,6 +251,8 @@ class FaceMesh:
     parameters : (n, 2) float64
         CAD parameters (u, v) of the points on a curved face, NaN where the CAD gives none; on a seam those of one side.
         Empty (0, 2) on plane faces.
+    parts : Parts or None
+        Of a face that is made of several, whose `parameters` are NaN.
     """
 
     face: int
@@ -219,6 +266,7 @@ class FaceMesh:
     port: Bool
     seed: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     parameters: Float = field(default_factory=lambda: np.zeros((0, 2)))
+    parts: Parts | None = None
 
     def __post_init__(self) -> None:
         if not len(self.seed):
@@ -439,6 +487,11 @@ class QuadMesh:
         Nodes inside every face (on no curve and no vertex).
     notes : tuple of str
         What the user should know (fall-backs that were taken).
+    quad_tag : (q,) int64
+        Gmsh tag of the CAD face of every quad, negative where that is oriented the other way; empty where all faces are single
+        CAD faces.
+    face_node_tag : tuple of (k,) int64
+        Gmsh tag of the CAD face that each of `face_nodes` is on; as empty.
     """
 
     points: Float
@@ -450,3 +503,5 @@ class QuadMesh:
     curve_parameters: tuple[Float, ...]
     face_nodes: tuple[Int, ...]
     notes: tuple[str, ...] = field(default=())
+    quad_tag: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    face_node_tag: tuple[Int, ...] = ()

@@ -69,6 +69,11 @@ class MeshResult:
         """Gmsh tags of the faces, by row of the model's faces."""
         return tuple(face.tag for face in self.stages.model.faces)
 
+    @property
+    def ignored_curves(self) -> tuple[int, ...]:
+        """Gmsh tags of the curves that were not followed, because faces go on smoothly across them (`feature_angle`)."""
+        return self.stages.model.ignored_curves
+
     @cached_property
     def normals(self) -> Float:
         """(f, 3) unit normal of every plane face, by row of the model's faces; NaN for curved ones."""

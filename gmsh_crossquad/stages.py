@@ -14,10 +14,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from .cad.background import background_meshes
+from .cad.joined_surfaces import JoinedSurfaces, cad_surfaces
 from .cad.put import curve_points, vertex_points
 from .cad.read import read_model
 from .cad.sizes import target_sizes
-from .cad.surfaces import CadSurfaces
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
 from .field.surface_mesh import SurfaceMesh
@@ -228,7 +228,7 @@ def _mesh(
 ) -> tuple[TMesh, Int, GuideResult, QuadMesh] | None:
     """Layout, guide grid and final mesh from the faces' T-meshes; None if `seen` has the same layout."""
     which = attempt.background, attempt.rule, attempt.pinned, attempt.capped
-    surfaces = CadSurfaces(model, faces.meshes)
+    surfaces = cad_surfaces(model, faces.meshes)
     with watch.stage("sizes"):
         sizes = target_sizes(model, faces.meshes, options)
     with watch.stage("glue"):
@@ -250,6 +250,8 @@ def _mesh(
     result = smooth_guide(model, surfaces, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
     with watch.stage("fill"):
         mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
+        if isinstance(surfaces, JoinedSurfaces):
+            mesh = surfaces.owned(mesh)
     return tmesh, coarse, result, mesh
 
 

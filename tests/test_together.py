@@ -20,6 +20,7 @@ from gmsh_crossquad.layout.glue import glue
 from gmsh_crossquad.layout.quantize import Indivisible, quantize
 from gmsh_crossquad.layout.together import divisible_together, mismatch
 from gmsh_crossquad.options import MeshOptions
+from gmsh_crossquad.source.formula import Singularities
 from gmsh_crossquad.watch import Watch
 
 from . import models, tmeshes
@@ -160,3 +161,26 @@ def test_other_sizes_of_blocks_are_not_tried_in_vain(notch, monkeypatch):
         stages.block_mesh(MeshOptions(size=0.15))
     keys = [(a.background, a.rule) for a in tried]
     assert keys == [(1.0, "keep"), (0.7, "keep"), (1.0, "divisible")]
+
+
+def test_singularities_on_a_torus_get_a_pair():
+    # cone points of 270 and 450 degrees must fit the holonomy of the handles, and there is no hole to help
+    angles = np.array([[0.3, 0.5], [2.0, 1.5]])
+    ring = 1 + 0.4 * np.cos(angles[:, 1])
+    places = np.stack([ring * np.cos(angles[:, 0]), ring * np.sin(angles[:, 0]), 0.4 * np.sin(angles[:, 1])], axis=1)
+    options = MeshOptions(size=0.12, field=Singularities(places, [1, -1]))
+    gmsh.initialize(interruptible=False, readConfigFiles=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addTorus(0, 0, 0, 1, 0.4)
+        gmsh.model.occ.synchronize()
+        model = stages.read_model(options)
+        wanted = stages.wishes(model, options)
+        given, found = (stages._faces(model, options, wanted, rule, Watch(), []) for rule in ("keep", "divisible"))
+    finally:
+        gmsh.finalize()
+    assert not has_divisions(model, given.meshes[0], given.tmeshes[0])
+    assert has_divisions(model, found.meshes[0], found.tmeshes[0])
+    index = found.fields[0].index
+    assert sorted(index[index != 0].tolist()) == [-1, -1, 1, 1]
+    assert index[list(found.fields[0].added)].tolist() == [1, -1]

@@ -29,10 +29,10 @@ def curved_areas(model: Model, surfaces: Surfaces, meshes: tuple[FaceMesh, ...])
     with gmsh_errors("measuring the faces"):
         known = {tag for _, tag in gmsh.model.occ.getEntities(2)}
     for row in np.flatnonzero(surfaces.curved).tolist():
-        tag = model.faces[row].tag
-        if tag in known:
-            with gmsh_errors("measuring a face", entity=(2, tag)):
-                out[row] = gmsh.model.occ.getMass(2, tag) / model.scale**2
+        tags = model.faces[row].tags
+        if known.issuperset(tags):
+            with gmsh_errors("measuring a face", entity=(2, tags[0])):
+                out[row] = sum(gmsh.model.occ.getMass(2, tag) for tag in tags) / model.scale**2
         else:
             out[row] = _extrapolated(surfaces, row, meshes[row].points, meshes[row].triangles)
     return out

@@ -15,6 +15,7 @@ import numpy as np
 from ..field.surface_mesh import SurfaceMesh
 from ..records import FaceMesh, Float, Model
 from .charts import Charts
+from .joined_surfaces import split
 from .session import gmsh_errors
 from .surface_samples import surface_samples
 
@@ -39,18 +40,47 @@ def edge_bending(model: Model, mesh: FaceMesh) -> Float:
     """
     face = model.faces[mesh.face]
     edges = SurfaceMesh(mesh.points, mesh.triangles).edges
-    with gmsh_errors("reading the kind of the surface", entity=(2, face.tag)):
-        discrete = gmsh.model.getType(2, face.tag).startswith("Discrete")
-    if discrete or not np.isfinite(mesh.parameters).all(axis=1).any():
+    known = _at_points(model, mesh, mesh.points) if mesh.parts is None else _of_parts(model, mesh)
+    if known is None:
         return np.full((len(edges), 3), np.nan)
-    own = np.arange(len(model.faces)) == mesh.face
-    charts = Charts.read(np.array([f.tag for f in model.faces]), own, model.scale)
-    samples = surface_samples(model, (mesh,), charts)
-    near = samples.nearest(np.full(len(mesh.points), mesh.face), mesh.points, 1, True)[:, 0]
-    turning, normal = samples.turning[near][edges], samples.normals[near][edges]
+    turning, normal = known[0][edges], known[1][edges]
     along = (mesh.points[edges[:, 1]] - mesh.points[edges[:, 0]])[:, None]
     x = along - np.einsum("eic,eic->ei", along.repeat(2, axis=1), normal)[..., None] * normal
     x /= np.linalg.norm(x, axis=2)[..., None]
     y = np.cross(normal, x)
     parts = [np.einsum("eic,eicd,eid->e", a, turning, b) for a, b in ((x, x), (y, y), (x, y))]
     return 0.5 * face.extent * np.stack(parts, axis=1)
+
+
+def _at_points(model: Model, mesh: FaceMesh, points: Float) -> tuple[Float, Float] | None:
+    """Derivatives (n, 3, 3) of the unit normal of a face and the normals (n, 3) at points, on the side of its triangles."""
+    face = model.faces[mesh.face]
+    if not face.curved:
+        return np.zeros((len(points), 3, 3)), np.tile(face.normal, (len(points), 1))
+    with gmsh_errors("reading the kind of the surface", entity=(2, face.tag)):
+        discrete = gmsh.model.getType(2, face.tag).startswith("Discrete")
+    if discrete or not np.isfinite(mesh.parameters).all(axis=1).any():
+        return None
+    own = np.arange(len(model.faces)) == mesh.face
+    charts = Charts.read(np.array([f.tag for f in model.faces]), own, model.scale)
+    samples = surface_samples(model, (mesh,), charts)
+    near = samples.nearest(np.full(len(points), mesh.face), points, 1, True)[:, 0]
+    return samples.turning[near], samples.normals[near]
+
+
+def _of_parts(model: Model, mesh: FaceMesh) -> tuple[Float, Float] | None:
+    """The same at the points of the mesh of a face that is made of parts: of the part with the nearest point."""
+    from ..spatial import cKDTree
+
+    assert mesh.parts is not None
+    whole, meshes, _ = split(model, (mesh,))
+    owner = np.repeat(np.arange(len(meshes)), [len(m.points) for m in meshes])
+    owner = owner[cKDTree(np.concatenate(mesh.parts.points)).query(mesh.points)[1]]
+    turning, normal = np.zeros((len(owner), 3, 3)), np.zeros((len(owner), 3))
+    for k in np.unique(owner).tolist():
+        known = _at_points(whole, meshes[k], mesh.points[owner == k])
+        if known is None:
+            return None
+        side = -1.0 if whole.faces[meshes[k].face].turned else 1.0
+        turning[owner == k], normal[owner == k] = side * known[0], side * known[1]
+    return turning, normal

@@ -75,6 +75,7 @@ def _face_mesh(model: Model, row: int, own: CurvedMesh, mesh: SurfaceMesh, sourc
         port=asked & (smooth | ~mesh.boundary_vertex),
         seed=np.where(old, own.seed[np.maximum(source, 0)], -1),
         parameters=np.where(old[:, None], own.parameters[np.maximum(source, 0)], np.nan),
+        parts=own.parts,
     )
 
 

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 
 import gmsh
 import numpy as np
 
 from ..records import Curve, Face, Float
+from .joints import Group
 from .loops import Loop
 from .session import gmsh_errors
 
-__all__ = ["chains", "curved_face", "seams"]
+__all__ = ["chains", "curved_face", "merged_face", "seams"]
 
 GRID = 24
 
@@ -99,6 +101,38 @@ def curved_face(
     free = tuple(p for p in dict.fromkeys(points) if p not in on_curves)
     area, extent = _measures(tag)
     return Face(tag, np.zeros(3), np.eye(3), loops, embedded, free, area / scale**2, extent / scale)
+
+
+def merged_face(
+    group: Group,
+    planes: Sequence[tuple[Float, Float] | None],
+    inside: list[int],
+    points: list[int],
+    curves: tuple[Curve, ...],
+    row: dict[int, int],
+    scale: float,
+) -> Face:
+    """The record of faces that are one surface.
+
+    Parameters
+    ----------
+    group : Group
+    planes : sequence of (origin, axes) or None
+        Frames of the plane ones.
+    inside, points, curves, row
+        As for `curved_face`.
+    scale : float
+        User's units in a scaled unit.
+    """
+    parts = []
+    for tag, turned, plane in zip(group.tags, group.turned, planes, strict=True):
+        centre, axes = plane or (np.zeros(3), np.eye(3))
+        area, extent = _measures(tag)
+        parts.append(Face(tag, centre, axes, (), area=area / scale**2, extent=extent / scale, turned=turned))
+    whole = curved_face(group.tags[0], [c for c in group.signed if abs(c) in row], inside, points, curves, row, scale)
+    boxes = np.array([gmsh.model.getBoundingBox(2, tag) for tag in group.tags])
+    extent = float(np.linalg.norm(boxes[:, 3:].max(axis=0) - boxes[:, :3].min(axis=0))) / scale
+    return replace(whole, area=sum(p.area for p in parts), extent=extent, parts=tuple(parts))
 
 
 def _measures(tag: int) -> tuple[float, float]:

@@ -20,9 +20,10 @@ import numpy as np
 
 from ..errors import MeshError
 from ..field.slivers import without_slivers
-from ..records import Bool, Float, Int, Model
+from ..records import Bool, Float, Int, Model, Parts
 from . import session
 from .curved_seeds import with_vertices
+from .part_meshes import joined, part_nodes, parts_of
 from .sample import evaluate
 from .seeds import GROWTH, InnerPoints
 from .space_size import SpaceSize
@@ -79,6 +80,8 @@ class CurvedMesh:
         Segments of all curves of the face, in the direction of their curve, as in `outline.Outline`.
     seed : (n,) int64
         Row of the face's seeds or -1; all -1 where it is left out.
+    parts : Parts or None
+        Of a face that is made of several.
     """
 
     points: Float
@@ -89,6 +92,7 @@ class CurvedMesh:
     curve: Int
     arclength: Float
     seed: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    parts: Parts | None = None
 
     def __post_init__(self) -> None:
         if not len(self.seed):
@@ -165,13 +169,12 @@ def triangulate_curved(
 
 @contextmanager
 def _only(model: Model, rows: Sequence[int]) -> Iterator[None]:
-    """Show these faces and their curves only; of curves that the model has left out only seams."""
+    """Show these faces and their curves only; of curves that the model has left out only seams and joints."""
     entities = gmsh.model.getEntities()
     before = [gmsh.model.getVisibility(*e) for e in entities]
-    known = {c.tag for c in model.curves}
+    known = {c.tag for c in model.curves} | set(model.ignored_curves)
     shown: set[tuple[int, int]] = set()
-    for row in rows:
-        tag = model.faces[row].tag
+    for tag in (tag for row in rows for tag in model.faces[row].tags):
         bound = Counter(abs(c) for _, c in gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False))
         shown |= {(2, tag), *((1, c) for c, n in bound.items() if c in known or n % 2 == 0)}
         shown |= set(gmsh.model.mesh.getEmbedded(2, tag))
@@ -250,9 +253,11 @@ def _around(model: Model, rows: Sequence[int], inner: Mapping[int, InnerPoints])
     out = {}
     for r in rows:
         if r in inner and len(inner[r].points):
-            out[model.faces[r].tag] = model.origin + model.scale * inner[r].points, model.scale * inner[r].size
+            places = model.origin + model.scale * inner[r].points, model.scale * inner[r].size
+            out.update(dict.fromkeys(model.faces[r].tags, places))
     if out:
-        places, sizes = zip(*out.values(), strict=True)
+        own = [out[model.faces[r].tag] for r in rows if model.faces[r].tag in out]
+        places, sizes = zip(*own, strict=True)
         out[0] = np.concatenate(places), np.concatenate(sizes)
     return out
 
@@ -288,9 +293,10 @@ def _curve_sizes(model: Model, rows: Sequence[int], spacing: tuple[Float, ...]) 
 
 def _limits(model: Model, rows: Sequence[int], sizes: Float) -> tuple[dict[int, float], dict[int, float]]:
     """Greatest size of triangles by face tag, and the size below which the curvature of the surface counts no more."""
-    limit = {model.faces[r].tag: float(sizes[r]) * model.scale for r in rows}
+    limit = {tag: float(sizes[r]) * model.scale for r in rows for tag in model.faces[r].tags}
     most = max(MOST_TRIANGLES / len(model.faces), FEW_TRIANGLES)
-    floor = {model.faces[r].tag: float(np.sqrt(2.3 * model.faces[r].area / most)) * model.scale for r in rows}
+    wanted = {r: float(np.sqrt(2.3 * model.faces[r].area / most)) * model.scale for r in rows}
+    floor = {tag: wanted[r] for r in rows for tag in model.faces[r].tags}
     return limit, {tag: min(size, limit[tag]) if np.isfinite(size) else 0.1 * limit[tag] for tag, size in floor.items()}
 
 
@@ -304,15 +310,10 @@ def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) 
     """The mesh that Gmsh made of a face, checked."""
     face = model.faces[row]
     with session.gmsh_errors("reading the background mesh", entity=(2, face.tag)):
-        triangles = _triangles(face.tag)
-        tags, coordinates, parameters = gmsh.model.mesh.getNodes(2, face.tag, includeBoundary=True, returnParametricCoord=True)
-    if not len(triangles):
-        raise MeshError("Gmsh made none")
-    tags, first = np.unique(np.asarray(tags, np.int64), return_index=True)
-    points = (np.asarray(coordinates).reshape(-1, 3)[first] - model.origin) / model.scale
-    uv = np.full((len(tags), 2), np.nan)
-    if len(parameters) == 2 * len(coordinates) // 3:
-        uv = np.asarray(parameters).reshape(-1, 2)[first]
+        own = [part_nodes(model, tag, _triangles(tag)) for tag in face.tags]
+        whole = own[0] if len(own) == 1 else joined(own, [part.turned for part in face.parts])
+        parts = parts_of(model, face, own) if face.parts else None
+    tags, points, uv, triangles = whole
     # Gmsh counts embedded points neither among the nodes of the face nor among those of its boundary
     inner = np.setdiff1d(np.array(face.embedded_points, np.int64) + 1, tags)
     order = np.argsort(np.concatenate([tags, inner]))
@@ -347,6 +348,7 @@ def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) 
         np.concatenate(segments) if segments else np.zeros((0, 2), np.int64),
         np.concatenate(curve) if curve else np.zeros(0, np.int64),
         np.concatenate(arclength) if arclength else np.zeros((0, 2)),
+        parts=parts,
     )
     _check(out)
     flipped = without_slivers(out.points, out.triangles, out.segments)

@@ -23,7 +23,7 @@ from ..errors import MeshError
 from ..field.surface_mesh import SurfaceMesh
 from ..records import Curve, Face, FaceMesh, Float, Int, Model
 from . import session
-from .surfaces import CadSurfaces
+from .joined_surfaces import cad_surfaces
 
 __all__ = ["gmsh_sizes", "triangle_areas"]
 
@@ -126,7 +126,8 @@ def _measured_curves(model: Model, meshes: tuple[FaceMesh, ...]) -> tuple[tuple[
 def _seam_edges(face: Face, model: Model) -> _Places:
     """Middles and lengths of the mesh edges on the curves of a face."""
     middles, lengths = [np.zeros((0, 3))], [np.zeros(0)]
-    for tag in gmsh.model.getAdjacencies(2, face.tag)[1].tolist():  # seams are no boundary
+    curves = dict.fromkeys(c for tag in face.tags for c in gmsh.model.getAdjacencies(2, tag)[1].tolist())
+    for tag in curves:  # seams and joints are no boundary
         points = _edge_points(tag, model)
         middles.append(points.mean(axis=1))
         lengths.append(np.linalg.norm(points[:, 1] - points[:, 0], axis=1))
@@ -233,7 +234,7 @@ def _bounded_by_curvature(model: Model, meshes: tuple[FaceMesh, ...], face: tupl
     factor = gmsh.option.getNumber("Mesh.MeshSizeFactor")
     low, high = (gmsh.option.getNumber(f"Mesh.MeshSize{end}") / model.scale for end in ("Min", "Max"))
     out = []
-    for h, curvature in zip(face, CadSurfaces(model, meshes).seed_curvatures, strict=True):
+    for h, curvature in zip(face, cad_surfaces(model, meshes).seed_curvatures, strict=True):
         bent = curvature > 0
         most = np.full(len(h), np.inf)
         most[bent] = np.clip(2 * np.pi / (turn * curvature[bent]), low, high) * factor
@@ -270,13 +271,14 @@ def _field_sizes(model: Model, meshes: tuple[FaceMesh, ...], known: tuple[Float,
 
 def _face_elements(face: Face, model: Model) -> tuple[Float, Float]:
     """Centres (k, 2) or (k, 3), local, and mean edge lengths (k,) of the elements on a face."""
-    tags, coordinates, _ = gmsh.model.mesh.getNodes(2, face.tag, includeBoundary=True)
-    order = np.argsort(tags)
-    local = face.local((coordinates.reshape(-1, 3) - model.origin) / model.scale)
-    centres, sizes = [np.zeros((0, local.shape[1]))], [np.zeros(0)]
-    for kind, corners in ((2, 3), (3, 4)):
-        _, nodes = gmsh.model.mesh.getElementsByType(kind, face.tag)
-        points = local[order[np.searchsorted(tags[order], nodes.reshape(-1, corners))]]
-        centres.append(points.mean(axis=1))
-        sizes.append(np.linalg.norm(points - np.roll(points, 1, axis=1), axis=2).mean(axis=1))
+    centres, sizes = [np.zeros((0, len(face.axes)))], [np.zeros(0)]
+    for part in face.tags:
+        tags, coordinates, _ = gmsh.model.mesh.getNodes(2, part, includeBoundary=True)
+        order = np.argsort(tags)
+        local = face.local((coordinates.reshape(-1, 3) - model.origin) / model.scale)
+        for kind, corners in ((2, 3), (3, 4)):
+            _, nodes = gmsh.model.mesh.getElementsByType(kind, part)
+            points = local[order[np.searchsorted(tags[order], nodes.reshape(-1, corners))]]
+            centres.append(points.mean(axis=1))
+            sizes.append(np.linalg.norm(points - np.roll(points, 1, axis=1), axis=2).mean(axis=1))
     return np.concatenate(centres), np.concatenate(sizes)

@@ -11,10 +11,11 @@ import gmsh
 import numpy as np
 
 from ..errors import InputError, MeshError
-from ..fill.high_order import high_order
+from ..fill.high_order import high_order, turned_over
 from ..records import Float, Int, Model, QuadMesh
 from ..surfaces import Surfaces
-from .put import curve_points
+from .joined_surfaces import JoinedSurfaces
+from .put import curve_points, on_faces
 from .session import gmsh_errors
 
 __all__ = ["element_order", "raise_order"]
@@ -82,22 +83,39 @@ def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, *,
         tags = np.cumsum(used)
         tags[n:] += shift
         for curve, nodes, parameters, lines in zip(model.curves, new.curve_nodes, new.curve_parameters, new.lines, strict=True):
-            _replace(1, curve.tag, LINES[order], tags[lines], tags[nodes], new.points[nodes - n], parameters)
-        bounds = np.searchsorted(mesh.quad_face, np.arange(len(model.faces) + 1))
-        for row, (face, nodes) in enumerate(zip(model.faces, new.face_nodes, strict=True)):
-            nodes = nodes[used[nodes]]
-            _replace(2, face.tag, kind, tags[quads[bounds[row] : bounds[row + 1]]], tags[nodes], new.points[nodes - n], [])
+            numbers = _removed(1, curve.tag, len(lines))
+            _add_nodes(1, curve.tag, tags[nodes], new.points[nodes - n], parameters)
+            _add_elements(curve.tag, LINES[order], numbers, tags[lines])
+        kept_nodes = [nodes[used[nodes]] for nodes in new.face_nodes]
+        back = turned_over(order)[:kept]
+        node_tags = [np.zeros(0, np.int64)] * len(kept_nodes)
+        if isinstance(surfaces, JoinedSurfaces):
+            node_tags = [surfaces.tags(row, new.points[nodes - n]) for row, nodes in enumerate(kept_nodes)]
+        owned = list(on_faces(model, mesh, kept_nodes, node_tags))
+        for tag, _, nodes in owned:  # first of all faces: a quad may have nodes of two
+            _add_nodes(2, abs(tag), tags[nodes], new.points[nodes - n], [])
+        for tag, rows, _ in owned:
+            own = quads[rows] if tag > 0 else quads[rows][:, back]
+            _add_elements(abs(tag), kind, _removed(2, abs(tag), len(own)), tags[own])
     return new.notes
 
 
-def _replace(dim: int, tag: int, kind: int, elements: Int, nodes: Int, points: Float, parameters: Float | list[float]) -> None:
-    """The elements of an entity by others in the same order with the same numbers, and their new nodes."""
+def _removed(dim: int, tag: int, count: int) -> Int:
+    """Remove the elements of an entity; their numbers."""
     _, numbers, _ = gmsh.model.mesh.getElements(dim, tag)
-    if sum(len(n) for n in numbers) != len(elements):
+    if sum(len(n) for n in numbers) != count:
         raise MeshError("the mesh of an entity is not the one that was put", entity=(dim, tag), remedy="report this model")
-    if not len(elements):
-        return
+    if not count:
+        return np.zeros(0, np.int64)
     gmsh.model.mesh.removeElements(dim, tag)
+    return np.asarray(numbers[0])
+
+
+def _add_nodes(dim: int, tag: int, nodes: Int, points: Float, parameters: Float | list[float]) -> None:
     if len(nodes):
         gmsh.model.mesh.addNodes(dim, tag, nodes, points.ravel(), parameters)
-    gmsh.model.mesh.addElementsByType(tag, kind, numbers[0], elements.ravel())
+
+
+def _add_elements(tag: int, kind: int, numbers: Int, nodes: Int) -> None:
+    if len(nodes):
+        gmsh.model.mesh.addElementsByType(tag, kind, numbers, nodes.ravel())

@@ -31,9 +31,10 @@ NUMBERS = {
     "max quads": "max_quads",
     "block size": "block_size",
     "background": "background",
+    "feature angle": "feature_angle",
 }
 SWITCHES = {"fix indices": "fix_indices", "relax": "relax"}
-KNOWN = "Element size, Max quads, Block size, Background, Fix indices, Relax, Field, Field 3 (for surface 3)"
+KNOWN = "Element size, Max quads, Block size, Background, Feature angle, Fix indices, Relax, Field, Field 3 (for surface 3)"
 OURS = re.compile(r"\d*crossquad/", re.IGNORECASE)
 FACE_FIELD = re.compile(r"field (\d+)")
 QUOTED = re.compile(r""""([^"\n]*)"|'([^'\n]*)'""")

@@ -13,7 +13,7 @@ but for the + 1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import gmsh
 import numpy as np
@@ -23,7 +23,7 @@ from ..records import Float, Int, Model, QuadMesh
 from .periodic import unlink
 from .session import gmsh_errors
 
-__all__ = ["curve_points", "put_mesh", "vertex_points"]
+__all__ = ["curve_points", "on_faces", "put_mesh", "vertex_points"]
 
 POINT, LINE, QUAD = 15, 1, 3  # Gmsh's element types
 
@@ -107,12 +107,53 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
             first = 0 if free_vertices.pop(int(nodes[0]), False) else 1
             _put_nodes(1, curve.tag, nodes[first:-1], mesh.points, places[first:-1])
             element += _put_elements(curve.tag, LINE, np.stack([nodes[:-1], nodes[1:]], axis=1), element)
-        if np.any(np.diff(mesh.quad_face) < 0):
-            raise MeshError("the quads are not ordered by face", remedy="report this model")
-        bounds = np.searchsorted(mesh.quad_face, np.arange(len(model.faces) + 1))
-        for row, (face, nodes, uv) in enumerate(zip(model.faces, mesh.face_nodes, of_faces, strict=True)):
-            _put_nodes(2, face.tag, nodes, mesh.points, uv)
-            element += _put_elements(face.tag, QUAD, mesh.quads[bounds[row] : bounds[row + 1]], element)
+        owned = list(on_faces(model, mesh, mesh.face_nodes, mesh.face_node_tag))
+        for row, (tag, _, nodes) in enumerate(owned):  # first of all faces: a quad may have nodes of two
+            _put_nodes(2, abs(tag), nodes, mesh.points, None if len(mesh.quad_tag) else of_faces[row])
+        for tag, rows, _ in owned:
+            quads = mesh.quads[rows] if tag > 0 else mesh.quads[rows][:, [0, 3, 2, 1]]
+            element += _put_elements(abs(tag), QUAD, quads, element) if len(quads) else 0
+
+
+def on_faces(
+    model: Model, mesh: QuadMesh, face_nodes: Sequence[Int], node_tags: Sequence[Int]
+) -> Iterator[tuple[int, slice | Int, Int]]:
+    """What belongs on every CAD face.
+
+    Parameters
+    ----------
+    model : Model
+    mesh : QuadMesh
+    face_nodes : sequence of (j,) int64
+        Nodes inside every face of the model.
+    node_tags : sequence of (j,) int64
+        Gmsh tags of the CAD faces that they are on; only read where there are faces of several.
+
+    Yields
+    ------
+    tag : int
+        Gmsh tag of a CAD face, negative where its quads are oriented the other way.
+    rows : slice or (n,) int64
+        Its quads.
+    nodes : (j,) int64
+        The nodes inside it.
+
+    Raises
+    ------
+    MeshError
+        The quads are not ordered by face.
+    """
+    if np.any(np.diff(mesh.quad_face) < 0):
+        raise MeshError("the quads are not ordered by face", remedy="report this model")
+    bounds = np.searchsorted(mesh.quad_face, np.arange(len(model.faces) + 1)).tolist()
+    for row, (face, nodes) in enumerate(zip(model.faces, face_nodes, strict=True)):
+        own = slice(bounds[row], bounds[row + 1])
+        if not face.parts:
+            yield face.tag, own, nodes
+            continue
+        for part in face.parts:
+            signed = -part.tag if part.turned else part.tag
+            yield signed, np.flatnonzero(mesh.quad_tag == signed), nodes[node_tags[row] == part.tag]
 
 
 def _isolated_points(model: Model) -> list[int]:

@@ -15,7 +15,8 @@ import numpy as np
 from ..errors import GeometryError
 from ..options import MeshOptions
 from ..records import Curve, Face, Float, Model
-from .curved_face import curved_face, seams
+from .curved_face import curved_face, merged_face, seams
+from .joints import Group, smooth_joints
 from .knots import untie
 from .loops import boundary_loops
 from .periodic import linked
@@ -84,7 +85,6 @@ def read_model(options: MeshOptions) -> Model:
     MeshError
         Where Gmsh fails on an entity.
     """
-    del options  # nothing that is read depends on them so far
     with gmsh_errors("reading the model"):
         tags = _wanted_faces()
         signs = {f: [c for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=True)] for f in tags}
@@ -124,20 +124,31 @@ def read_model(options: MeshOptions) -> Model:
         [r.tag for r in kept if r.ends[0] == r.ends[1]],
         {r.tag: r.kind for r in kept},
     )
+    groups: tuple[Group, ...] = ()
+    if options.feature_angle is not None:
+        ranges = {r.tag: (float(r.parameters[0]), float(r.parameters[-1])) for r in kept if r.tag not in spacing}
+        groups = smooth_joints(signs, ranges, needed, np.radians(options.feature_angle), scale)
+        kept, vertices, points = _without_joints(groups, kept, vertices, points)
     curves = tuple(_curve(r, origin, scale, spacing.get(r.tag)) for r in kept)
     row = {c.tag: i for i, c in enumerate(curves)}
     place = np.array(vertices.points).reshape(-1, 3)
     faces = []
+    part_of = {f: group for group in groups for f in group.tags}
+    tags = [f for f in tags if f not in part_of or f == part_of[f].tags[0]]
     for f in tags:
+        if f in part_of:
+            frames = [planes[p] for p in part_of[f].tags]
+            held = [row[c] for p in part_of[f].tags for c in inside[p] if c in row]
+            faces.append(merged_face(part_of[f], frames, held, points[f], curves, row, scale))
+            continue
         bound, embed = [c for c in signs[f] if abs(c) in row], [row[c] for c in inside[f] if c in row]
         plane = planes[f]
         if plane is None:
             faces.append(curved_face(f, bound, embed, points[f], curves, row, scale))
         else:
             faces.append(_face(f, bound, embed, points[f], curves, row, place, plane))
-    groups = {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     groups_of = _group_names(2)
-    asked = groups | {vertices.tags[p] for f in tags for p in points[f]}
+    asked = _physical_points() | {vertices.tags[p] for f in tags for p in points[f]}
     return Model(
         name=gmsh.model.getCurrent(),
         origin=origin,
@@ -147,17 +158,44 @@ def read_model(options: MeshOptions) -> Model:
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
         faces=tuple(faces),
-        notes=_notes(kept),
+        notes=_notes(kept, groups),
         point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
+        ignored_curves=tuple(sorted(c for group in groups for c in group.ignored)),
     )
 
 
-def _notes(kept: list[_Raw]) -> tuple[str, ...]:
+def _physical_points() -> set[int]:
+    """Tags of the points in physical groups."""
+    return {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
+
+
+def _without_joints(
+    groups: tuple[Group, ...], kept: list[_Raw], vertices: _Vertices, points: dict[int, list[int]]
+) -> tuple[list[_Raw], _Vertices, dict[int, list[int]]]:
+    """Curves, vertices and points inside faces without the joints of groups; points in physical groups on joints are inside."""
+    asked = _physical_points()
+    ends = {r.tag: r.ends for r in kept}
+    points = dict(points)
+    for group in groups:
+        inside = [v for f in group.tags for v in points[f]]
+        inside += [v for c in group.ignored for v in ends[c] if vertices.tags[v] in asked]
+        points[group.tags[0]] = list(dict.fromkeys(inside))
+    ignored = {c for group in groups for c in group.ignored}
+    if ignored:
+        kept = [r for r in kept if r.tag not in ignored]
+        vertices, points = _needed_vertices(vertices, kept, points)
+    return kept, vertices, points
+
+
+def _notes(kept: list[_Raw], groups: tuple[Group, ...]) -> tuple[str, ...]:
     """What the user should know about the model."""
     notes = [f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied]
     if linked():
         notes.append("the mesh is not periodic; periodic links of the model are taken off")
+    ignored = sum(len(group.ignored) for group in groups)
+    if ignored:
+        notes.append(f"{ignored} smooth curve{'s were' if ignored > 1 else ' was'} not followed")
     return tuple(notes)
 
 

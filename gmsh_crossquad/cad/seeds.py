@@ -149,16 +149,26 @@ def on_curved(model: Model, row: int, point: Float) -> bool:
 
 
 def _feet(model: Model, row: int, points: Float) -> Float:
-    """Nearest points (k, 3) of a curved face, scaled; NaN for those that are far from it or beside it.
+    """Nearest points (k, 3) of a curved face, scaled; NaN for those that are far from it or beside it."""
+    face = model.faces[row]
+    out, away = np.full(points.shape, np.nan), np.full(len(points), np.inf)
+    for part in face.parts or (face,):
+        foot = _feet_of_part(model, part, 10 * OFF_SURFACE * face.extent, points)
+        distance = np.linalg.norm(foot - points, axis=1)
+        nearer = distance < away
+        out[nearer], away[nearer] = foot[nearer], distance[nearer]
+    return out
+
+
+def _feet_of_part(model: Model, face: Face, reach: float, points: Float) -> Float:
+    """Nearest points of one CAD face.
 
     Only points near the face's box are asked for.  Gmsh's nearest point is one of the whole surface; on faces of OpenCASCADE it
     also tells whether that is in the face.  A face without a parametrization takes the points as they are.
     """
-    face = model.faces[row]
     out = np.full(points.shape, np.nan)
     with gmsh_errors("measuring", entity=(2, face.tag)):
         box = (np.array(gmsh.model.getBoundingBox(2, face.tag)).reshape(2, 3) - model.origin) / model.scale
-        reach = 10 * OFF_SURFACE * face.extent
         near = np.flatnonzero(((points >= box[0] - reach) & (points <= box[1] + reach)).all(axis=1))
         if gmsh.model.getType(2, face.tag).startswith("Discrete"):
             out[near] = points[near]

@@ -129,7 +129,7 @@ class CadSurfaces:
         tag = self.model.faces[face_row].tag
         x = self.model.origin + self.model.scale * points
         if not self.curved[face_row]:
-            with self._current(), gmsh_errors("evaluating", entity=(2, tag)):
+            with self.current(), gmsh_errors("evaluating", entity=(2, tag)):
                 origin, u, v = gmsh.model.getValue(2, tag, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]).reshape(3, 3)
             return np.linalg.lstsq(np.stack([u - origin, v - origin], axis=1), (x - origin).T, rcond=None)[0].T
         on = np.full(len(points), face_row)
@@ -171,7 +171,7 @@ class CadSurfaces:
         return Planes(self.model)
 
     @contextmanager
-    def _current(self) -> Iterator[None]:
+    def current(self) -> Iterator[None]:
         """Gmsh's model of this name current."""
         before = gmsh.model.getCurrent()
         if before == self.model.name:
@@ -187,7 +187,7 @@ class CadSurfaces:
     def _facets(self) -> list[Any]:
         """The triangles of faces without a parametrization, None for others."""
         out: list[Facets | None] = [None] * len(self.model.faces)
-        with self._current():
+        with self.current():
             for mesh in self.meshes:
                 tag = self.model.faces[mesh.face].tag
                 if self.curved[mesh.face] and (
@@ -199,7 +199,7 @@ class CadSurfaces:
     @cached_property
     def _charts(self) -> Charts:
         own = np.array([c and f is None for c, f in zip(self.curved, self._facets)], bool)
-        with self._current():
+        with self.current():
             return Charts.read(np.array([f.tag for f in self.model.faces]), own, self.model.scale)
 
     def _split(self, face: Int) -> Iterator[Int]:
@@ -212,7 +212,7 @@ class CadSurfaces:
 
     @cached_property
     def _samples(self) -> SurfaceSamples:
-        with self._current():
+        with self.current():
             return surface_samples(self.model, self.meshes, self._charts)
 
     def _foot(self, face: Int, points: Float) -> tuple[Float, Float]:
@@ -223,7 +223,7 @@ class CadSurfaces:
             row = int(np.flatnonzero(~np.isfinite(x).all(axis=1))[0])
             raise MeshError("a node has no place", entity=(2, self.model.faces[face[row]].tag), location=x[row].tolist())
         near = samples.nearest(face, points, 1, True)[:, 0]
-        with self._current():
+        with self.current():
             uv, foot, good = newton(charts, face, x, samples.start[near], size)
             again = np.flatnonzero(~good | samples.at_pole(charts, face, uv))
             if not len(again):

@@ -19,7 +19,7 @@ __all__ = ["validate"]
 
 NO_WIDTH = 1e-9  # of the face's size
 SHARPEST = np.radians(0.5)
-PARTING = np.radians(3.0)  # of the chords of curves that touch in a corner
+PARTING = np.radians(1.0)  # of the chords of curves that touch in a corner
 SAME = 1e-9  # of the model
 ON_CURVE = 1e-6  # of the model: the accuracy of the samples
 LIPS = 1e-6  # of the model: lips of a crack that are drawn twice

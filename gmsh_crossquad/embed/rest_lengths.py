@@ -11,6 +11,8 @@ one length l, in three steps on u = log l:
    neighbours are the opposite edges in the quads (across) and the continuing edges at the vertices (along);
 3. where two neighbours still differ by more than `LEAST_RATIO`, both move half of the excess.
 
+Between 1 and 2 the edges of quads in cusps get lengths of their own (`kites`), which they keep.
+
 Last, on every curve the lengths between two fixed vertices are scaled so that their sum is the arc length there, and in
 every face so that the quads fill its area.
 """
@@ -21,11 +23,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..cusps import find_cusps
 from ..errors import MeshError
 from ..quad_edges import edges_of_quads
 from ..records import Bool, Float, Guide, Int, Model
 from ..surfaces import Surfaces, quad_normals
 from .curve_table import CurveTable
+from .kites import kites
 from .start import chain_arclengths
 
 __all__ = ["RestLengths", "rest_lengths"]
@@ -112,6 +116,7 @@ def rest_lengths(
             np.minimum.at(low, edge_rows[:, k], height)
         own = (1.0 - actual) * own + actual * present
     held = np.zeros(len(edges), dtype=bool)
+    cusps = find_cusps(guide, model)
     for row, rows in enumerate(chain_edges):
         fixed = guide.fixed[guide.chains[row]].copy()
         if len(fixed):
@@ -131,8 +136,11 @@ def rest_lengths(
                 turns[row][~single] = np.where(bulge > 1.0, turning / np.sqrt(np.maximum(bulge, 1.0)), np.inf)[~single]
     own = np.minimum(own, tight)
     if graded:
-        pairs = _neighbours(guide, chain_edges, edges, edge_rows)
-        own = _limit(_diffuse(own, pairs, held), pairs, held)
+        pairs = _neighbours(guide, chain_edges, edges, edge_rows, cusps.quad)
+        kept = held
+        if len(cusps.quad):
+            own, kept = kites(own, held, cusps, edge_rows, chain_edges, model, table)
+        own = _limit(_diffuse(own, pairs, kept), pairs, kept)
         if actual > 0.0:
             own = present + np.clip(own - present, -np.log(FARTHEST), np.log(FARTHEST))
             own = np.minimum(own, tight)
@@ -179,14 +187,18 @@ def _chain_edges(guide: Guide, model: Model, edges: Int) -> list[Int]:
     return rows
 
 
-def _neighbours(guide: Guide, chain_edges: list[Int], edges: Int, quad_edges: Int) -> Int:
+def _neighbours(guide: Guide, chain_edges: list[Int], edges: Int, quad_edges: Int, kites: Int) -> Int:
     """Pairs of edges that should have similar lengths (p, 2): opposite in a quad, or continuing at a vertex.
+
+    Opposite edges of quads in cusps (`kites`) have nothing to do with each other.
 
     Two edges continue each other at a vertex if it is regular and they share no quad there; on a curve if they follow
     each other along it.  Both are found from the quads alone: at an interior vertex of valence 4 every edge meets the
     other two edges of its two quads once, so its continuation is the sum of all four edges less these and itself.
     """
     across = np.concatenate([quad_edges[:, [0, 2]], quad_edges[:, [1, 3]]])
+    if len(kites):
+        across = np.delete(across, np.concatenate([kites, kites + len(quad_edges)]), axis=0)
     n = len(guide.points)
     corner = guide.quads.ravel()
     out = quad_edges.ravel()

@@ -23,7 +23,7 @@ from ..records import Bool, Float, Int, Model, QuadMesh
 from ..surfaces import Surfaces
 from .elements import Elements
 
-__all__ = ["HighOrder", "high_order"]
+__all__ = ["HighOrder", "high_order", "turned_over"]
 
 SAMPLES = 8  # pieces of an edge on a curve by which its length is measured
 
@@ -123,6 +123,12 @@ def high_order(
         )
     exact = [np.where(straighter[e, None, None], np.nan, x) for (e, _), x in zip(rows, on_curves, strict=True)]
     return _record(model, mesh, work, rows, parameters, on_curve, exact, notes)
+
+
+def turned_over(order: int) -> list[int]:
+    """Gmsh's numbering of the nodes of a quad, seen from its other side: corner 0 stays, corners 1 and 3 change places."""
+    place = {p: k for k, p in enumerate(GRID[order])}
+    return [place[j, i] for i, j in GRID[order]]
 
 
 def _chain(edges: Int, chain: Int, n: int) -> tuple[Int, Bool]:

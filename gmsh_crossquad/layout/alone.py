@@ -1,4 +1,8 @@
-"""A face whose layout has no integer divisions: look at it alone, and try other fields until it has."""
+"""A face whose layout has no integer divisions: look at it alone, and try other fields until it has.
+
+First those of `field.repair`, which change the flux around holes, then pairs of singularities where the layout misses divisions
+(`together`), which also help where there are no holes, as on a torus.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,7 @@ from ..records import AlignedField, FaceMesh, FaceTMesh, Int, Model
 from .face_tmesh import trace_face
 from .glue import glue
 from .quantize import quantize
+from .together import divisible_together
 
 __all__ = ["divisible", "has_divisions"]
 
@@ -65,6 +70,13 @@ def divisible(
             continue
         if has_divisions(model, mesh, found):
             return other, found
+    alone = replace(model, faces=(model.faces[mesh.face],))
+    try:
+        paired = divisible_together(alone, [mesh], [aligned], [tmesh])
+    except LayoutError:
+        paired = None
+    if paired is not None:
+        return paired.fields[0], paired.tmeshes[0]
     loops = SurfaceMesh(mesh.points, mesh.triangles).loops
     worst = int(np.argmax(np.abs(aligned.flux))) if loops else -1
     around = f" (flux {aligned.flux[worst]:.3g} around a boundary loop)" if loops else ""

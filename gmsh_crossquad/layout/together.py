@@ -107,7 +107,7 @@ def divisible_together(
     meshes: Sequence[FaceMesh],
     fields: Sequence[AlignedField],
     tmeshes: Sequence[FaceTMesh],
-    cuts: Sequence[Cut],
+    cuts: Sequence[Cut] | None = None,
 ) -> Together | None:
     """Fields with pairs of singularities added whose layouts have integer divisions together, and those layouts.
 
@@ -116,8 +116,8 @@ def divisible_together(
     model : Model
     meshes, fields, tmeshes : one per face
         The layouts have no divisions.
-    cuts : sequence of Cut
-        Separation cuts of the quantization that found none.
+    cuts : sequence of Cut, optional
+        Separation cuts of the quantization that found none; by default those of one with few divisions.
 
     Returns
     -------
@@ -131,7 +131,10 @@ def divisible_together(
     """
     now = Together(tuple(fields), tuple(tmeshes), {})
     glued = glue(model, meshes, tmeshes)
-    weight, known = _weights(glued), tuple(cuts)
+    met = _cuts(model, glued) if cuts is None else tuple(cuts)
+    if met is None:
+        return None
+    weight, known = _weights(glued), met
     missing = mismatch(model, glued, known, weight)
     if not np.any(missing):
         return None
@@ -157,7 +160,7 @@ def divisible_together(
 
 
 def _cuts(model: Model, tmesh: TMesh) -> tuple[Cut, ...] | None:
-    """None if there are divisions, else the cuts that were met before there were none."""
+    """None if there are divisions, else the separation cuts that were met before there were none."""
     try:
         # lengths do not matter for this; few divisions make it fast
         quantize(model, tmesh, np.maximum(tmesh.length / (0.25 * tmesh.length.max()), 0.5))
