@@ -30,9 +30,10 @@ from .space_size import SpaceSize
 
 __all__ = ["CurvedMesh", "triangulate_curved"]
 
-ALGORITHMS = (5, 6, 1)  # Delaunay, frontal Delaunay (does not end on some surfaces of revolution), MeshAdapt
+ALGORITHMS = (6, 5, 1)  # frontal Delaunay, Delaunay, MeshAdapt; the first two do not end on some surfaces
 PER_TURN = 16  # triangles per full turn of the surface
 MOST_TRIANGLES, FEW_TRIANGLES = 8_000.0, 250.0  # in the model, and of a face of a large one, because of curvature
+MOST_CALLS, ENDLESS = 25_000, 1e22  # of the size function for a face, before it is told to stop; the size that tells it
 POINT, LINE, TRIANGLE, QUAD = 15, 1, 2, 3
 NONE: Mapping[int, InnerPoints] = MappingProxyType({})
 OPTIONS: dict[str, float] = {
@@ -105,6 +106,7 @@ class _Given:
 
     first: Int  # tag of the first inner node of every curve
     count: int
+    endless: frozenset[int] = frozenset()  # faces whose mesher had to be stopped
 
     def chain(self, model: Model, row: int, nodes: int) -> Int:
         """Tags of all `nodes` nodes of a curve."""
@@ -225,9 +227,13 @@ def _generate(
     before = getattr(gmsh, "api_callback_", None)
 
     around = _around(model, rows, inner)
+    asked: Counter[int] = Counter()
 
     def size(dim: int, tag: int, x: float, y: float, z: float, lc: float) -> float:
         if dim == 2:
+            asked[tag] += 1
+            if asked[tag] > MOST_CALLS:
+                return ENDLESS
             wanted = near(x, y, z, min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least)))
         else:  # seams: the size from curvature vanishes at an apex
             wanted, tag = min(max(lc, lowest), least), 0
@@ -245,7 +251,7 @@ def _generate(
         mesh.removeSizeCallback()
         if before is not None:
             gmsh.api_callback_ = before
-    return given
+    return replace(given, endless=frozenset(tag for tag, count in asked.items() if count > MOST_CALLS))
 
 
 def _around(model: Model, rows: Sequence[int], inner: Mapping[int, InnerPoints]) -> dict[int, tuple[Float, Float]]:
@@ -309,6 +315,8 @@ def _curves(model: Model, row: int) -> list[int]:
 def _collect(model: Model, row: int, spacing: tuple[Float, ...], given: _Given) -> CurvedMesh:
     """The mesh that Gmsh made of a face, checked."""
     face = model.faces[row]
+    if face.tag in given.endless:
+        raise MeshError("Gmsh's mesher did not end")
     with session.gmsh_errors("reading the background mesh", entity=(2, face.tag)):
         own = [part_nodes(model, tag, _triangles(tag)) for tag in face.tags]
         whole = own[0] if len(own) == 1 else joined(own, [part.turned for part in face.parts])
