@@ -36,7 +36,7 @@ POINTS, FACTORS = [(0.8, 0.3), (-0.5, 0.7), (-0.7, -0.5), (0.3, -0.8)], (1.6, 0.
 #: radius around singular points, and part of the cap's radius: the error is taken outside and inside
 CORE, INSIDE = 0.3, 0.95
 CAP = math.radians(81)
-#: of quads on the octant; the least scaled Jacobian that they may have (three equal angles: sin 120 degrees = .866)
+#: of quads on the octant; the least scaled Jacobian that they may have (three equal angles in a plane: sin 120 degrees = .866)
 SIZES, LEAST = (0.2, 0.1, 0.05, 0.02), 0.86
 
 
