@@ -10,7 +10,7 @@ import numpy as np
 
 from ..records import Float, Int
 
-__all__ = ["Facets", "vertex_normals"]
+__all__ = ["Facets", "closest", "vertex_normals"]
 
 NEAR = 8
 MOST = 64
@@ -84,7 +84,7 @@ class Facets:
         while len(todo):
             distance, near = tree.query(x[todo], k=k)
             distance, near = distance.reshape(len(todo), k), near.reshape(len(todo), k)
-            bary = _closest(np.repeat(x[todo], k, axis=0), self.points[self.triangles[near.ravel()]])
+            bary = closest(np.repeat(x[todo], k, axis=0), self.points[self.triangles[near.ravel()]])
             feet = np.einsum("nk,nkc->nc", bary, self.points[self.triangles[near.ravel()]]).reshape(len(todo), k, 3)
             away = np.linalg.norm(feet - x[todo][:, None], axis=2)
             best, row = away.argmin(axis=1), np.arange(len(todo))
@@ -104,7 +104,7 @@ class Facets:
         return out / np.where(length > 0, length, 1.0)[:, None]
 
 
-def _closest(x: Float, corner: Float) -> Float:
+def closest(x: Float, corner: Float) -> Float:
     """Barycentric coordinates (n, 3) of the nearest point of each triangle (n, 3, 3): inside, else on the nearest edge."""
     edge = np.roll(corner, -1, axis=1) - corner
     along = np.einsum("nkc,nkc->nk", x[:, None] - corner, edge)

@@ -1,9 +1,9 @@
 """Which of its parts a point of a face that is made of several is nearest to.
 
-The nearest background triangle tells, except close to a joint: its edges are chords of the CAD curve.  There the curve itself
-decides.  Let c be its point nearest to x, and d1, d2 the directions from c into the two faces, across the curve.  Where
-(x - c) . d is positive for one of them only, that one is nearest; for both (a groove), the one of the triangle; for none (a
-ridge), the nearest point is c.
+The nearest background triangle, of those around the nearest points, tells, except close to a joint: its edges are chords of the
+CAD curve.  There the curve itself decides.  Let c be its point nearest to x, and d1, d2 the directions from c into the two
+faces, across the curve.  Where (x - c) . d is positive for one of them only, that one is nearest; for both (a groove), the one of
+the triangle; for none (a ridge), the nearest point is c.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from ..records import Bool, Float, Int, Parts
 from .charts import runs
-from .facets import Facets
+from .facets import closest
 from .session import gmsh_errors
 
 __all__ = ["PartSearch"]
@@ -26,6 +26,7 @@ __all__ = ["PartSearch"]
 RINGS = 2  # of points around a joint at which the nearest point alone does not tell
 CLOSE = 3.0  # times the height of the arcs over their chords
 NEAREST = 4  # edges that are tried
+AROUND = 4  # nearest points whose triangles are tried; those on joints are there twice
 ROUNDS = 8
 PRECISION = 1e-9  # of an edge
 
@@ -91,10 +92,18 @@ class PartSearch:
         near = np.asarray(tree.query(points)[1], np.int64).reshape(-1)
         part = owner[near]
         unsure = np.flatnonzero(doubtful[near])
-        facets, triangle_part = self._facets
-        foot, triangle, _ = facets.nearest(points[unsure])
-        part[unsure] = triangle_part[triangle]
-        return part, unsure, foot
+        corners, triangle_part, start, around = self._triangles
+        x = points[unsure]
+        beside = np.asarray(tree.query(x, k=AROUND)[1], np.int64).reshape(-1)
+        count = start[beside + 1] - start[beside]
+        first = np.cumsum(count) - count
+        tried = around[np.arange(count.sum()) + np.repeat(start[beside] - first, count)]
+        row = np.repeat(np.repeat(np.arange(len(x)), AROUND), count)
+        feet = np.einsum("nk,nkc->nc", closest(x[row], corners[tried]), corners[tried])
+        order = np.lexsort((np.linalg.norm(feet - x[row], axis=1), row))
+        best = order[np.searchsorted(row[order], np.arange(len(x)))]
+        part[unsure] = triangle_part[tried[best]]
+        return part, unsure, feet[best]
 
     @cached_property
     def _points(self) -> tuple[Any, Int, Bool]:
@@ -112,12 +121,14 @@ class PartSearch:
         return cKDTree(np.concatenate(self.parts.points)), owner, np.concatenate(near)
 
     @cached_property
-    def _facets(self) -> tuple[Facets, Int]:
-        """All triangles, and their parts."""
-        start = np.cumsum([0, *map(len, self.parts.points)])
-        triangles = np.concatenate([t + s for t, s in zip(self.parts.triangles, start)])
+    def _triangles(self) -> tuple[Float, Int, Int, Int]:
+        """Corners of all triangles, their parts, and those around every point, one point after the other: starts and rows."""
+        first = np.cumsum([0, *map(len, self.parts.points)])
+        triangles = np.concatenate([t + s for t, s in zip(self.parts.triangles, first)])
         owner = np.repeat(np.arange(len(self.parts.triangles)), [len(t) for t in self.parts.triangles])
-        return Facets(np.concatenate(self.parts.points), triangles), owner
+        start = np.concatenate([[0], np.cumsum(np.bincount(triangles.ravel(), minlength=first[-1]))])
+        around = np.argsort(triangles.ravel(), kind="stable") // 3
+        return np.concatenate(self.parts.points)[triangles], owner, start, around
 
     @cached_property
     def _edges(self) -> _Edges:

@@ -39,6 +39,8 @@ MOST_TRIALS = 12
 MOST_LISTED = 4
 #: factor on the weights of patches where a pair did not help
 FAILED = 4.0
+#: the same where there is no room for one
+FULL = 1e3
 #: cost of a division over the least of a mismatch, which makes the solution less arbitrary
 SMALL = 1e-6
 LEAST = 1e-6
@@ -75,8 +77,9 @@ def mismatch(model: Model, tmesh: TMesh, cuts: Sequence[Cut], weight: Float) -> 
     weight : (p,) float64
         Cost of a mismatch of 1.
     """
-    found = _program(tmesh, [*at_least(tmesh, model), *(c for c in cuts if len(c.options) == 1)], weight)
-    return found if np.any(found) else _program(tmesh, [*at_least(tmesh, model), *cuts], weight)
+    plain = [c for c in cuts if len(c.options) == 1]
+    found = _program(tmesh, [*at_least(tmesh, model), *plain], weight)
+    return found if np.any(found) or len(plain) == len(cuts) else _program(tmesh, [*at_least(tmesh, model), *cuts], weight)
 
 
 def _program(tmesh: TMesh, cuts: Sequence[Cut], weight: Float) -> Float:
@@ -138,7 +141,13 @@ def divisible_together(
     missing = mismatch(model, glued, known, weight)
     if not np.any(missing):
         return None
+    proved = bool(np.any(mismatch(model, glued, [c for c in known if len(c.options) == 1], weight)))
+    tried: set[bytes] = set()
     for _ in range(MOST_TRIALS):
+        key = np.sign(missing).tobytes()
+        if key in tried:  # nothing else is left
+            break
+        tried.add(key)
         following = _with_pairs(model, meshes, now, glued, missing)
         if following is not None:
             other = glue(model, meshes, following.tmeshes)
@@ -148,9 +157,12 @@ def divisible_together(
             left = mismatch(model, other, more, _weights(other))
             if 0 < np.abs(left).sum() < np.abs(missing).sum() - LEAST:
                 now, glued, known, missing, weight = following, other, more, left, _weights(other)
+                tried.clear()
                 continue
-        weight = np.where(np.any(missing, axis=1), FAILED * weight, weight)
+        weight = np.where(np.any(missing, axis=1), (FULL if following is None else FAILED) * weight, weight)
         missing = mismatch(model, glued, known, weight)
+    if not proved:
+        return None
     tags = sorted({model.faces[f].tag for f in glued.patch_face[np.any(missing, axis=1)].tolist()})
     raise Indivisible(
         f"no divisions of the layout ({len(glued.patches)} patches) keep all corners and singularities apart",

@@ -9,7 +9,22 @@ import sys
 from drawing import write
 from study import HERE
 
-FIGURES = ("fig01", "fig03", "fig04", "fig07", "fig08", "fig09", "fig10", "fig12", "fig13", "fig14", "disc")
+FIGURES = (
+    "fig01",
+    "fig03",
+    "fig04",
+    "fig07",
+    "fig08",
+    "fig09",
+    "fig10",
+    "fig12",
+    "fig13",
+    "fig14",
+    "fig15",
+    "fig17",
+    "fig20",
+    "disc",
+)
 BEGIN, END = "<!-- written by run.py -->\n", "<!-- end -->\n"
 
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import gmsh
 import numpy as np
+import numpy.typing as npt
 from separatrices import Complex, Parts, Power, interpolated, parts
 
 import gmsh_crossquad as cq
@@ -23,6 +24,9 @@ from gmsh_crossquad.judge import check_task
 from gmsh_crossquad.quality import twins
 
 HERE = Path(__file__).resolve().parent
+Float = npt.NDArray[np.float64]
+#: least scaled Jacobian of a good mesh of a curved face
+LEAST = 0.6
 
 
 @dataclass
@@ -49,8 +53,8 @@ class Checks:
 
 @contextmanager
 def model(name: str) -> Iterator[str]:
-    """A .geo file of this folder as Gmsh's current model; yields its path."""
-    path = str(HERE / f"{name}.geo")
+    """A .geo file of this folder, or of the examples in geo/, as Gmsh's current model; yields its path."""
+    path = str(next(p for p in (HERE / f"{name}.geo", HERE.parents[1] / "geo" / f"{name}.geo") if p.exists()))
     with guest():
         gmsh.option.setNumber("General.Verbosity", 1)
         open_model(path)
@@ -67,11 +71,23 @@ def text(points: Sequence[tuple[float, float]], quarters: Sequence[int]) -> str:
 
 @dataclass
 class Study:
-    """A mesh of a plane model of one face or several, and what is read off it."""
+    """A mesh of a model of one face or several, and what is read off it, in the plane z = 0."""
 
     path: str
     result: cq.MeshResult
     faults: list[str]
+
+    def flat(self, points: Float) -> Complex:
+        """Places (n,) of points (n, 3) in the plane."""
+        return points[:, 0] + 1j * points[:, 1]
+
+    def arms(self, points: Float, directions: Float) -> Complex:
+        """Directions (n, 3) at points (n, 3) in the plane."""
+        return directions[:, 0] + 1j * directions[:, 1]
+
+    def lift(self, z: Complex) -> Float:
+        """Points (n, 3) of places (n,) in the plane."""
+        return np.stack([z.real, z.imag, 0 * z.real], axis=1)
 
     @property
     def face(self) -> cq.FaceField:
@@ -79,26 +95,33 @@ class Study:
 
     @property
     def surface(self) -> SurfaceMesh:
-        return SurfaceMesh(self.face.points[:, :2].copy(), self.face.triangles)
+        z = self.flat(self.face.points)
+        return SurfaceMesh(np.stack([z.real, z.imag], axis=1), self.face.triangles)
 
     def loops(self) -> list[Complex]:
         """The boundary of the first face, the domain on the left, the outer loop first."""
-        z = self.face.points[:, 0] + 1j * self.face.points[:, 1]
+        z = self.flat(self.face.points)
         return [z[loop] for loop in self.surface.loops]
 
     def boundary_indices(self) -> list[tuple[complex, int]]:
         """Places and indices (quarter turns) of the singular boundary points of the first face."""
-        f, on = self.face, self.surface.boundary_vertex
-        return [(complex(*f.points[v, :2]), int(f.index[v])) for v in np.flatnonzero(on & (f.index != 0))]
+        f, on, z = self.face, self.surface.boundary_vertex, self.flat(self.face.points)
+        return [(complex(z[v]), int(f.index[v])) for v in np.flatnonzero(on & (f.index != 0))]
+
+    def singular(self) -> list[tuple[complex, int]]:
+        """Places and indices (quarter turns) of the singular points inside."""
+        found = self.result.singularities
+        places = self.flat(np.array([s.point for s in found]).reshape(-1, 3))
+        return [(complex(z), s.index) for z, s in zip(places, found)]
 
     def power(self, aligned: bool) -> Power:
         """The fourth power of the given or the aligned cross of the first face, from its background mesh."""
-        arms = self.face.directions if aligned else self.face.given
-        return interpolated(*(a[:, 0] + 1j * a[:, 1] for a in (self.face.places, arms)))
+        places, directions = self.face.places, self.face.directions if aligned else self.face.given
+        return interpolated(self.flat(places), self.arms(places, directions))
 
     def parts(self, power: Power, radius: float | None = None) -> Parts:
         """The parts into which the separatrices of a field with these singular points cut the first face."""
-        points = [complex(*s.point[:2]) for s in self.result.singularities]
+        points = [z for z, _ in self.singular()]
         ring = 2.0 * float(self.surface.edge_length.mean()) if radius is None else radius
         sharp = [z for z, q in self.boundary_indices() if q == 1]
         return parts(power, self.loops(), points, [ring] * len(points), sharp)
@@ -106,7 +129,7 @@ class Study:
     def quads_at(self, z: complex) -> int:
         """Number of quads of the mesh around its node at (or nearest to) a point."""
         mesh = self.result.mesh
-        node = int(np.argmin(np.hypot(mesh.points[:, 0] - z.real, mesh.points[:, 1] - z.imag)))
+        node = int(np.argmin(np.abs(self.flat(mesh.points) - z)))
         return int(np.sum(mesh.quads == node))
 
     def irregular(self) -> list[tuple[complex, int]]:
@@ -114,18 +137,35 @@ class Study:
         mesh = self.result.mesh
         valence = np.bincount(mesh.quads.ravel(), minlength=len(mesh.points))
         valence[np.concatenate([*mesh.curve_nodes, mesh.vertex_node])] = 4
-        return [(complex(*mesh.points[v, :2]), int(valence[v])) for v in np.flatnonzero((valence != 4) & (valence > 0))]
+        rows = np.flatnonzero((valence != 4) & (valence > 0))
+        return [(complex(z), int(n)) for z, n in zip(self.flat(mesh.points[rows]), valence[rows])]
 
     def four_sided(self) -> tuple[int, int]:
         """Number of blocks with exactly four corners, and of all blocks, from the quads alone.
 
-        A block has a corner where a quad has two edges in a row across which there is no quad of the block.
+        A block has a corner where a quad has two edges in a row across which there is no quad of the block.  One that meets
+        itself, two of its sides being the same, has none, and the Euler characteristic of a ring.
         """
         quads, block = self.result.mesh.quads, self.result.mesh.quad_block
         across = twins(quads)
         rim = ((across < 0) | (block[across // 4] != np.repeat(block, 4))).reshape(-1, 4)
         corners = np.bincount(block, (rim & np.roll(rim, 1, axis=1)).sum(axis=1))[np.unique(block)]
-        return int(np.sum(corners == 4)), len(corners)
+        good = [n == 4 or (n == 0 and _euler(quads[block == b]) == 0) for b, n in zip(np.unique(block), corners)]
+        return sum(good), len(corners)
+
+    def worst_corner(self) -> float:
+        """The least scaled Jacobian: the sine of a quad's corner in the plane of its diagonals."""
+        corner = self.result.mesh.points[self.result.mesh.quads]
+        normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+        ahead, back = np.roll(corner, -1, axis=1) - corner, np.roll(corner, 1, axis=1) - corner
+        sine = np.einsum("qkc,qc->qk", np.cross(ahead, back), normal / np.linalg.norm(normal, axis=1)[:, None])
+        return float((sine / np.linalg.norm(ahead, axis=2) / np.linalg.norm(back, axis=2)).min())
+
+
+def _euler(quads: npt.NDArray[np.int64]) -> int:
+    """Vertices less edges, plus quads."""
+    ends = np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2)
+    return len(np.unique(quads)) - len(np.unique(np.sort(ends, axis=1), axis=0)) + len(quads)
 
 
 def solve(path: str, **options: Any) -> Study:
@@ -177,11 +217,21 @@ def check_places(checks: Checks, study: Study, points: Sequence[tuple[float, flo
 def check_sum(checks: Checks, study: Study, euler: int, name: str = "") -> None:
     """Poincaré-Hopf."""
     lead = f"{name}: " if name else ""
-    inside = [s.index for s in study.result.singularities]
+    inside = [q for _, q in study.singular()]
     on = [q for _, q in study.boundary_indices()]
     lists = (" ".join(quarter_text(q) for q in some) or "none" for some in (inside, on))
     found = f"{sum(inside + on) / 4:g} (inside {next(lists)}; boundary {next(lists)})"
     checks.holds(f"{lead}sum of indices", str(euler), found, sum(inside + on) == 4 * euler)
+
+
+def check_faces(checks: Checks, study: Study, euler: Sequence[int], name: str = "") -> None:
+    """Poincaré-Hopf on every face, and the shape of the quads."""
+    lead = f"{name}: " if name else ""
+    found = [int(f.index.sum()) / 4 for f in study.result.field]
+    texts = [", ".join(f"{x:g}" for x in some) for some in (euler, found)]
+    checks.holds(f"{lead}sum of indices (every face)", *texts, found == list(euler))
+    worst = study.worst_corner()
+    checks.holds(f"{lead}least scaled Jacobian", f"> {LEAST:g}", f"{worst:.2f}", worst > LEAST)
 
 
 def refused(checks: Checks, what: str, expected: str, **options: Any) -> None:
