@@ -83,12 +83,12 @@ def face_meshes(
     """
     points = inner_points(model, sizes, seeds)
     rows = [row for row, face in enumerate(model.faces) if not face.curved]
-    out: dict[int, FaceMesh] = {}
-    with kept_bounds():
-        if rows:
+    curved = [row for row, face in enumerate(model.faces) if face.curved]
+    # in the user's model, before the bounding box of a scratch model is that of the session
+    out = dict(zip(curved, curved_meshes(model, curved, spacing, sizes, points), strict=True))
+    if rows:
+        with kept_bounds():
             out.update(zip(rows, _plane_meshes(model, rows, spacing, sizes, points), strict=True))
-        curved = [row for row in range(len(model.faces)) if row not in out]
-        out.update(zip(curved, curved_meshes(model, curved, spacing, sizes, points), strict=True))
     return tuple(out[row] for row in range(len(model.faces)))
 
 

@@ -223,7 +223,7 @@ def _generate(
             element += len(ends)
     limit, floor = _limits(model, rows, sizes)
     least, lowest = min(limit.values()), min(floor.values())
-    near = _curve_sizes(model, sorted(used), spacing)
+    near = {model.faces[r].tag: _curve_sizes(model, _curves(model, r), spacing) for r in rows}
     before = getattr(gmsh, "api_callback_", None)
 
     around = _around(model, rows, inner)
@@ -234,7 +234,9 @@ def _generate(
             asked[tag] += 1
             if asked[tag] > MOST_CALLS:
                 return ENDLESS
-            wanted = near(x, y, z, min(max(lc, floor.get(tag, 0.0)), limit.get(tag, least)))
+            if tag not in near:
+                return least
+            wanted = near[tag](x, y, z, min(max(lc, floor[tag]), limit[tag]))
         else:  # seams: the size from curvature vanishes at an apex
             wanted, tag = min(max(lc, lowest), least), 0
         if tag in around:
