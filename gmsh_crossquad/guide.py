@@ -31,7 +31,7 @@ ROUNDS = 3
 FEW = 4
 GROWTH = 3
 WORTH_REFINING = 0.02
-MOST_QUADS = 25_000
+MOST_QUADS, QUADS_PER_FACE = 25_000, 100
 DOUBLINGS = 3  # of the final edges on curves that turn too much
 LARGE = 6_000  # cells from which a grid is refined for folded cells only
 Evaluate = Callable[[int, Float], Float]
@@ -115,13 +115,14 @@ def smooth_guide(
             divisions = chord_divisions(model, tmesh, coarse, chords, size, guide_size, finer=finer, capped=capped)
             q = quotient(tmesh, arc_divisions(chords, divisions.guide))
             first = first or len(q.quads)
-            if len(q.quads) > min(GROWTH * first, max(first, MOST_QUADS)):
+            most = max(MOST_QUADS, QUADS_PER_FACE * len(model.faces))
+            if len(q.quads) > min(GROWTH * first, max(first, most)):
                 break
             if best is not None and not best[0][0] and len(q.quads) > LARGE:
                 break
-            if len(q.quads) > MOST_QUADS:
+            if len(q.quads) > most:
                 raise TooManyCells(
-                    f"the guide grid would have {len(q.quads)} cells, more than {MOST_QUADS}",
+                    f"the guide grid would have {len(q.quads)} cells, more than {most}",
                     remedy="the model has too many short curves or narrow places for its size",
                 )
             wrong = problems(model, tmesh, q)

@@ -142,6 +142,8 @@ class _Faces:
 def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult:
     """Mesh the current Gmsh model; returns records only.
 
+    Where faces that were joined cannot be meshed, every CAD curve is followed instead, and a note says so.
+
     Parameters
     ----------
     options : MeshOptions
@@ -153,6 +155,19 @@ def block_mesh(options: MeshOptions, watch: Watch | None = None) -> StagesResult
         A stage failed; the message says where and what to do.
     """
     watch = watch or Watch()
+    try:
+        return _block_mesh(options, watch)
+    except (LayoutError, MeshError) as error:
+        if not options.feature_angle:
+            raise
+        note = f"all curves were followed, since with joined faces: {error.what}"
+        made = _block_mesh(replace(options, feature_angle=None), watch)
+    mesh = replace(made.mesh, notes=(note, *made.mesh.notes))
+    return replace(made, mesh=mesh, notes=mesh.notes)
+
+
+def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
+    """What `block_mesh` does with these options, and no others."""
     notes: list[str] = []
     with watch.stage("read"):
         model = read_model(options)
