@@ -176,6 +176,7 @@ def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
     notes += model.notes
     faces: dict[tuple[float, Rule], _Faces] = {}
     hopeless: set[tuple[float, Rule]] = set()
+    failed: set[tuple[float, Rule]] = set()
     seen: set[tuple[object, ...]] = set()
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
@@ -186,9 +187,13 @@ def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
         before = watch.work
         try:
             key = attempt.background, attempt.rule
+            if key in failed:
+                continue
             if key not in faces:
+                failed.add(key)
                 finer = replace(options, background=options.background * attempt.background)
                 faces[key] = _faces(model, finer, wanted, attempt.rule, watch, notes)
+                failed.remove(key)
             if key in hopeless:  # other sizes of blocks change nothing
                 continue
             found = faces[key] if attempt.pinned else faces[key].free()
