@@ -46,6 +46,7 @@ MANY_ARCS = 3_500
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.3
 MOST_WORK = 30_000
+ARC_WORK = 3  # of an arc in the quantization of a shell, in smoothed quads
 
 
 class Attempt(NamedTuple):
@@ -185,10 +186,10 @@ def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
         if 2 * watch.work - before > MOST_WORK:  # as much again as the last attempt took would be too much
             break
         before = watch.work
+        key = attempt.background, attempt.rule
+        if key in failed:
+            continue
         try:
-            key = attempt.background, attempt.rule
-            if key in failed:
-                continue
             if key not in faces:
                 failed.add(key)
                 finer = replace(options, background=options.background * attempt.background)
@@ -221,6 +222,8 @@ def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
             if isinstance(failure, TooManyCells) and isinstance(error, TooManyCells):
                 break
             failure = failure or error
+            if key in failed and isinstance(error, MeshError):  # Gmsh has no background triangles
+                break
             notes.append(f"another layout was tried, since: {error.what}")
             continue
         fit = curve_fit(mesh)
@@ -256,6 +259,8 @@ def _mesh(
         size, user_size = arc_sizes(model, tmesh, sizes)
     area = sum(_area(m) for m in faces.meshes)
     guide_size = float(np.sqrt(area / GUIDE_QUADS))
+    if surfaces.curved.any():
+        watch.work += ARC_WORK * len(tmesh.length)
     with watch.stage("quantize"):
         block = np.maximum(options.block_size * user_size, np.sqrt(area) * attempt.blocks / BLOCKS)
         if len(block) > MANY_ARCS:
