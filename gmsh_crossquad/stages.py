@@ -46,6 +46,7 @@ MANY_ARCS = 3_500
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.3
 MOST_WORK = 30_000
+MOST_WORK_CURVED = 20_000
 ARC_WORK = 3  # of an arc in the quantization of a shell, in smoothed quads
 
 
@@ -182,8 +183,11 @@ def _block_mesh(options: MeshOptions, watch: Watch) -> StagesResult:
     failure: CrossQuadError | None = None
     best: tuple[tuple[bool, bool, float], StagesResult] | None = None
     before = watch.work
+    shell = any(face.curved for face in model.faces)
     for attempt in _attempts(wanted, options):
-        if 2 * watch.work - before > MOST_WORK:  # as much again as the last attempt took would be too much
+        if 2 * watch.work - before > (
+            MOST_WORK_CURVED if shell else MOST_WORK
+        ):  # as much again as the last attempt took would be too much
             break
         before = watch.work
         key = attempt.background, attempt.rule
