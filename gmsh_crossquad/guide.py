@@ -33,7 +33,6 @@ GROWTH = 3
 WORTH_REFINING = 0.02
 MOST_QUADS, QUADS_PER_FACE = 25_000, 100
 DOUBLINGS = 3  # of the final edges on curves that turn too much
-MANY = 3_000  # cells of a shell from which only chords of folded cells are divided
 LARGE, HUGE = 6_000, 10_000  # cells of a shell from which it is refined for folded cells only, and not at all
 Evaluate = Callable[[int, Float], Float]
 
@@ -156,8 +155,6 @@ def smooth_guide(
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
         finer = divisions.guide.copy()
-        if surfaces.curved.any() and len(folded) and len(q.quads) > MANY:  # no more cells than the folds need
-            bad, steep = folded, steep[:0]
         finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, surfaces, guide, bad), steep)])] *= 2
     assert best is not None
     (folds, _, quality), guide, fine = best
