@@ -46,7 +46,7 @@ MANY_ARCS = 3_500
 GOOD_QUALITY = 0.02
 GOOD_FIT = 0.3
 MOST_WORK = 30_000
-MOST_WORK_CURVED = 26_000
+MOST_WORK_CURVED = 20_000
 ARC_WORK = 3  # of an arc in the quantization of a shell, in smoothed quads
 
 
