@@ -260,6 +260,15 @@ def test_a_seam_in_a_physical_group_is_kept():
     assert [model.curves[c].tag for c in face.embedded_curves] == [seam]
 
 
+def test_a_face_that_another_one_touches_at_its_pole_is_refused():
+    """The mesh of a box around a sphere that touches it would not be joined there."""
+    occ = gmsh.model.occ
+    occ.cut([(3, occ.addBox(-1, -1, -1, 2, 2, 2))], [(3, occ.addSphere(0, 0, 0, 1))])
+    occ.synchronize()
+    with pytest.raises(GeometryError, match="touches this one"):
+        read()
+
+
 def test_a_flat_spline_surface_is_planar():
     occ = gmsh.model.occ
     points = [occ.addPoint(x, y, 2.0) for y in (0, 1, 2) for x in (0, 1, 3)]

@@ -172,21 +172,14 @@ def triangulate_curved(
 @contextmanager
 def _only(model: Model, rows: Sequence[int]) -> Iterator[None]:
     """Show these faces and their curves only; of curves that the model has left out only seams and joints."""
-    entities = gmsh.model.getEntities()
-    before = [gmsh.model.getVisibility(*e) for e in entities]
     known = {c.tag for c in model.curves} | set(model.ignored_curves)
     shown: set[tuple[int, int]] = set()
     for tag in (tag for row in rows for tag in model.faces[row].tags):
         bound = Counter(abs(c) for _, c in gmsh.model.getBoundary([(2, tag)], combined=False, oriented=False))
         shown |= {(2, tag), *((1, c) for c, n in bound.items() if c in known or n % 2 == 0)}
         shown |= set(gmsh.model.mesh.getEmbedded(2, tag))
-    try:
-        for e in entities:
-            gmsh.model.setVisibility([e], int(e in shown or e[0] == 0))
+    with session.visible(shown):
         yield
-    finally:
-        for e, value in zip(entities, before):
-            gmsh.model.setVisibility([e], value)
 
 
 def _generate(

@@ -187,17 +187,10 @@ def _votes(face: int, signed: Sequence[int]) -> list[int]:
 @contextmanager
 def _shown(faces: Sequence[int]) -> Iterator[None]:
     """Show these faces and their curves only."""
-    entities = gmsh.model.getEntities()
-    before = [gmsh.model.getVisibility(*e) for e in entities]
     shown = {(2, f) for f in faces}
     shown |= {(1, abs(c)) for f in faces for _, c in gmsh.model.getBoundary([(2, f)], combined=False, oriented=False)}
-    try:
-        for e in entities:
-            gmsh.model.setVisibility([e], int(e in shown or e[0] == 0))
+    with session.visible(shown):
         yield
-    finally:
-        for e, value in zip(entities, before):
-            gmsh.model.setVisibility([e], value)
 
 
 def _groups(

@@ -118,6 +118,7 @@ def read_model(options: MeshOptions) -> Model:
     left = seams(bounds, [f for f in tags if planes[f] is None], needed)
     if left or len(kept) < len(raw):
         kept = [r for r in kept if r.tag not in left]
+        _check_contacts(vertices, raw, kept, bounds, points)
         vertices, points = _needed_vertices(vertices, kept, points)
     spacing = transfinite_parameters(
         {r.tag: float(np.sqrt((np.diff(r.points, axis=0) ** 2).sum(1)).sum()) for r in kept},
@@ -306,6 +307,22 @@ def _height(points: Float) -> float:
     spread = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
     extent = np.ptp(spread, axis=0)
     return float(extent[2] / max(extent[0], np.finfo(float).tiny))
+
+
+def _check_contacts(
+    vertices: _Vertices, raw: list[_Raw], kept: list[_Raw], bounds: dict[int, list[int]], points: dict[int, list[int]]
+) -> None:
+    """Refuse a face that another one touches in a vertex to which only a seam or a pole of it leads: no node would be there."""
+    ends, own = {r.tag: set(r.ends) for r in raw}, {r.tag: set(r.ends) for r in kept}
+    used = set().union(*own.values(), *points.values())
+    for f, curves in bounds.items():
+        left = set().union(*(ends[c] for c in curves)) - set().union(*(own.get(c, set()) for c in curves), points[f])
+        for v in sorted(left & used):
+            remedy = "split the face there, or move the faces apart"
+            place = vertices.points[v].tolist()
+            raise GeometryError(
+                "another face touches this one in a point of its seam", entity=(2, f), location=place, remedy=remedy
+            )
 
 
 def _needed_vertices(

@@ -22,7 +22,7 @@ import numpy as np
 from ..errors import MeshError
 from ..records import Float, Int
 
-__all__ = ["MeshSnapshot", "gmsh_errors", "guest", "is_running", "options", "scratch_model"]
+__all__ = ["MeshSnapshot", "gmsh_errors", "guest", "is_running", "options", "scratch_model", "visible"]
 
 
 def is_running() -> bool:
@@ -136,6 +136,20 @@ def scratch_model() -> Iterator[str]:
             gmsh.model.setCurrent(name)
             gmsh.model.remove()
         _make_current(before)
+
+
+@contextmanager
+def visible(shown: set[tuple[int, int]]) -> Iterator[None]:
+    """Show these entities (dim, tag) and all points of the current model only; the visibility of every entity is put back."""
+    entities = gmsh.model.getEntities()
+    before = [gmsh.model.getVisibility(*e) for e in entities]
+    try:
+        for e in entities:
+            gmsh.model.setVisibility([e], int(e in shown or e[0] == 0))
+        yield
+    finally:
+        for e, value in zip(entities, before):
+            gmsh.model.setVisibility([e], value)
 
 
 @dataclass(frozen=True)
