@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import Bounds, LinearConstraint, milp
 
-from gmsh_crossquad.layout.integer_program import IntegerProgram
+from gmsh_crossquad.layout.integer_program import GAP, IntegerProgram
 
 
 def dense(program: IntegerProgram, matrix, lower, upper) -> None:
@@ -75,6 +75,33 @@ def test_solutions_are_feasible_and_no_better_than_the_optimum(seed):
     assert solution is not None and exact.x is not None
     assert (matrix @ solution.values == right).all()
     assert solution.bound - 1e-9 <= exact.fun <= solution.cost + 1e-6
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000))
+def test_improved_solutions_are_within_the_gap_of_the_optimum(seed):
+    rng = np.random.default_rng(seed)
+    n, m = 12, 5
+    matrix = rng.integers(-1, 3, (m, n))
+    matrix = matrix[np.any(matrix != 0, axis=1)]
+    right = matrix @ rng.integers(0, 4, n)
+    cost = rng.integers(1, 9, n).astype(float)
+    program = IntegerProgram(cost, np.full(n, 8.0))
+    dense(program, matrix, right, right)
+    dive = program.solve()
+    exact = milp(cost, constraints=LinearConstraint(matrix, right, right), integrality=np.ones(n), bounds=Bounds(0, 8))
+    assert dive is not None and exact.x is not None
+    better = program.improved(dive)
+    assert (matrix @ better.values == right).all() and better.cost == pytest.approx(cost @ better.values)
+    assert exact.fun - 1e-6 <= better.cost <= dive.cost
+    assert better.cost <= (1 + GAP) * exact.fun + 1e-6
+
+
+def test_improving_keeps_a_solution_at_its_bound():
+    program = IntegerProgram(np.array([1.0, 2.0]), np.array([10.0, 10.0]))
+    dense(program, [[1, 1]], [3], [np.inf])
+    solution = program.solve()
+    assert program.improved(solution) is solution
 
 
 def test_columns_that_are_not_integral_may_be_fractions():

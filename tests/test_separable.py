@@ -69,6 +69,16 @@ def test_only_changed_parts_are_solved_again():
         add(program, [(np.array([1, 2]), np.ones(2), 1.0)], np.arange(4))
 
 
+def test_parts_are_improved_one_by_one():
+    program = SeparableProgram(np.ones(4), np.full(4, 9.0), np.array([0, 0, 1, 1]))
+    with pytest.raises(ValueError, match="not been solved"):
+        program.improved(np.zeros(2))
+    add(program, [(np.array([0, 1]), np.ones(2), 3.0), (np.array([2, 3]), np.ones(2), 2.5)], np.arange(4))
+    found = program.solve()
+    better = program.improved(np.zeros(2))
+    assert better.cost <= found.cost and better.cost == better.values.sum() == 6
+
+
 def test_infeasible_part():
     program = SeparableProgram(np.ones(2), np.ones(2), np.array([0, 1]))
     add(program, [(np.array([1]), np.ones(1), 2.0)], np.arange(2))

@@ -4,6 +4,10 @@ The relaxation of a T-mesh quantization is half-integral but for the few rows th
 columns to the next integer and solving again from the last basis (dual simplex) usually makes whole cycles of others integral.
 Where that turns out infeasible one column alone is raised, then lowered (depth first).  HiGHS solves the linear programs.
 Measured on 6,948 arcs (104 faces): relaxation .09 s with 47 fractional columns, while branch and cut by HiGHS takes 43 s.
+
+The dive finds good solutions of a pure flow, poor ones where there are other rows (127 where the best is 42, on 442 columns of
+a thin-walled box).  `IntegerProgram.improved` then takes the branch and cut of HiGHS, from the dive's solution: zero-half cuts
+close nearly all gaps in the root node, in .02 to .4 s up to 2,000 columns.
 """
 
 from __future__ import annotations
@@ -20,6 +24,11 @@ __all__ = ["IntegerProgram", "Solution"]
 FRACTION = 1e-6
 MAX_PROGRAMS = 3_000
 BATCH = 40
+# branch and cut: share of the whole cost that the gap may have; most nodes; effort of heuristics; most columns
+GAP = 0.02
+NODES = 200
+HEURISTICS = 0.05
+MOST_COLUMNS = 4_000
 
 
 @dataclass(frozen=True)
@@ -30,6 +39,8 @@ class Solution:
     ----------
     values : (n,) int64
         Columns that are not integral are rounded.
+    columns : (n,) float64
+        As the solver found them.
     cost : float
     bound : float
         Cost of the linear relaxation: no solution is cheaper.
@@ -38,6 +49,7 @@ class Solution:
     """
 
     values: Int
+    columns: Float
     cost: float
     bound: float
     programs: int
@@ -96,6 +108,42 @@ class IntegerProgram:
             return None
         return np.array(self._solver.getSolution().col_value), float(self._solver.getInfo().objective_function_value)
 
+    def improved(self, solution: Solution, offset: float = 0.0) -> Solution:
+        """A solution that is no worse than the given one; at most `GAP` above the best where `NODES` nodes show that.
+
+        One that is less than that above its bound is kept as it is.
+
+        Parameters
+        ----------
+        solution : Solution
+            Of this program.
+        offset : float
+            Constant part of the cost, which the gap is measured with.
+        """
+        if solution.cost - solution.bound <= GAP * abs(solution.cost + offset) or self.n_columns > MOST_COLUMNS:
+            return solution
+        solver = highspy.Highs()
+        for option, value in (
+            ("output_flag", False),
+            ("threads", 1),
+            ("mip_rel_gap", GAP),
+            ("mip_max_nodes", NODES),
+            ("mip_heuristic_effort", HEURISTICS),
+        ):
+            solver.setOptionValue(option, value)
+        solver.passModel(self._solver.getModel())
+        solver.changeObjectiveOffset(offset)
+        whole = np.flatnonzero(self._integral).astype(np.int32)
+        solver.changeColsIntegrality(len(whole), whole, np.full(len(whole), highspy.HighsVarType.kInteger))
+        every = np.arange(self.n_columns, dtype=np.int32)
+        solver.setSolution(len(every), every, solution.columns)
+        solver.run()
+        x = np.array(solver.getSolution().col_value)
+        cost = float(solver.getInfo().objective_function_value) - offset
+        if len(x) != self.n_columns or not cost < solution.cost:
+            return solution
+        return Solution(np.round(x).astype(np.int64), x, cost, solution.bound, solution.programs + 1)
+
     def _bound(self, column: int, low: float, high: float) -> None:
         self._solver.changeColBounds(column, low, high)
 
@@ -114,7 +162,7 @@ class IntegerProgram:
                 x, cost = found
                 distance = np.where(self._integral, np.abs(x - np.round(x)), 0.0)
                 if distance.max(initial=0.0) <= FRACTION:
-                    answer = Solution(np.round(x).astype(np.int64), cost, bound, programs)
+                    answer = Solution(np.round(x).astype(np.int64), x, cost, bound, programs)
                     break
                 branch = _Branch(_candidates(x, distance), x)
                 branch.take(low, high)

@@ -27,6 +27,7 @@ from .arc_bends import arc_bends
 from .conditions import at_least, balance
 from .cuts import Cut, separation_cuts
 from .handles import handle_cuts, homology
+from .integer_program import Solution
 from .quotient import quotient
 from .separable import SeparableProgram, parts_of_arcs
 
@@ -150,6 +151,15 @@ def quantize(
     new = at_least(tmesh, model)
     base = set(new)
     big = largest + float(floor.max(initial=0.0))
+
+    def result(solution: Solution) -> tuple[Int, list[Cut]]:
+        """Divisions, and what they violate."""
+        divisions = (floor + expand @ solution.values[: len(arc)]).astype(np.int64)
+        found = quotient(tmesh, divisions)
+        new = separation_cuts(tmesh, found) or handle_cuts(tmesh, found, classes)
+        return divisions, [cut for cut in new if cut not in known]
+
+    offset = np.bincount(part, _cost(target, floor)).astype(float)
     for round_ in range(1, MAX_ROUNDS + 1):
         known.update(dict.fromkeys(new))
         _add_cuts(program, new if disjunctions else [Cut(c.options[:1]) for c in new], expand, floor, big, part)
@@ -161,9 +171,10 @@ def quantize(
             )
             error.cuts = tuple(cut for cut in known if cut not in base)
             raise error
-        divisions = (floor + expand @ solution.values[: len(arc)]).astype(np.int64)
-        found = quotient(tmesh, divisions)
-        new = [c for c in separation_cuts(tmesh, found) or handle_cuts(tmesh, found, classes) if c not in known]
+        divisions, new = result(solution)
+        if not new:
+            solution = program.improved(offset)
+            divisions, new = result(solution)
         if progress is not None:
             progress(
                 f"quantization round {round_}: cost {solution.cost:.4g}, bound {solution.bound:.4g}, "

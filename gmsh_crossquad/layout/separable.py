@@ -93,9 +93,29 @@ class SeparableProgram:
                     return None
                 programs += found.programs
                 self._solutions[k] = found
-        found_all = [s for s in self._solutions if s is not None]
-        values = np.empty(self.n_columns, np.int64)
-        for k, solution in enumerate(found_all):
+        return self._whole(programs)
+
+    def improved(self, offset: Float) -> Solution:
+        """The last solution, made better part by part (see `IntegerProgram.improved`).
+
+        Parameters
+        ----------
+        offset : (parts,) float64
+            Constant part of the cost of every part.
+        """
+        for k, program in enumerate(self._programs):
+            solution = self._solutions[k]
+            if solution is None:
+                raise ValueError("the program has not been solved")
+            self._solutions[k] = program.improved(solution, float(offset[k]))
+        return self._whole(0)
+
+    def _whole(self, programs: int) -> Solution:
+        """The solutions of all parts as one."""
+        found = [s for s in self._solutions if s is not None]
+        columns = np.empty(self.n_columns)
+        for k, solution in enumerate(found):
             mine = np.flatnonzero(self._part == k)
-            values[mine] = solution.values[self._own[mine]]
-        return Solution(values, sum(s.cost for s in found_all), sum(s.bound for s in found_all), programs)
+            columns[mine] = solution.columns[self._own[mine]]
+        cost, bound = sum(s.cost for s in found), sum(s.bound for s in found)
+        return Solution(np.round(columns).astype(np.int64), columns, cost, bound, programs)
