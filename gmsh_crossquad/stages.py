@@ -20,7 +20,7 @@ from .cad.read import read_model
 from .cad.sizes import target_sizes
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
-from .field.surface_mesh import SurfaceMesh
+from .field.surface_mesh import surface_of
 from .field_stage import Rule, Wishes, changes_of, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
@@ -296,7 +296,7 @@ def _evaluator(model: Model) -> Callable[[int, Float], Float]:
 
 
 def _area(mesh: FaceMesh) -> float:
-    return float(SurfaceMesh(mesh.points, mesh.triangles).area.sum())
+    return float(surface_of(mesh).area.sum())
 
 
 def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:
