@@ -21,6 +21,7 @@ import scipy.sparse as sp
 
 from ..records import Float, Int
 from .operators import FieldOperators, factor
+from .symmetric import part, shifted
 
 __all__ = ["ConnectionOperators"]
 
@@ -59,9 +60,8 @@ class ConnectionOperators:
         return sp.coo_matrix(entries, (n, n)).tocsr()
 
     @cached_property
-    def _inner(self) -> sp.csr_matrix:
-        rows = _pairs(self.free)
-        return self.stiffness[rows][:, rows]
+    def _inner(self) -> sp.csc_matrix:
+        return part(self.stiffness, _pairs(self.free))
 
     def apply(self, z: Float) -> Float:
         """(e, 2) stiffness times z (e, 2)."""
@@ -70,12 +70,13 @@ class ConnectionOperators:
 
     def load(self, z: Float) -> Float:
         """(f, 2) what the boundary values of z (e, 2) add to the right-hand side of the free edges."""
-        edge = self.scalar.fixed
-        return -(self.stiffness[_pairs(self.free)][:, _pairs(edge)] @ z[edge].ravel()).reshape(-1, 2)
+        boundary = np.zeros_like(z)
+        boundary[self.scalar.fixed] = z[self.scalar.fixed]
+        return -self.apply(boundary)[self.free]
 
     def shifted(self, shift: Float, scale: float = 1.0) -> Solver:
         """Factors of ``diag(shift) + scale K`` among the free edges; `shift` (f,) is one number per edge."""
-        return Solver((sp.diags(np.repeat(shift, 2)) + scale * self._inner).tocsc())
+        return Solver(shifted(self._inner, np.repeat(shift, 2), scale))
 
 
 class Solver:
