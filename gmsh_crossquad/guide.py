@@ -81,7 +81,7 @@ def smooth_guide(
     tmesh: TMesh,
     coarse: Int,
     size: Float,
-    guide_size: float,
+    guide_size: Float,
     evaluate: Evaluate,
     vertices: Float,
     watch: Watch,
@@ -93,7 +93,7 @@ def smooth_guide(
     ----------
     coarse : (a,) int64
     size : (a,) float64, scaled
-    guide_size : float, scaled
+    guide_size : (a,) float64, scaled
     evaluate, vertices
         As for `fill.pipeline.fill`.
     watch : Watch

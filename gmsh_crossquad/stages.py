@@ -30,6 +30,7 @@ from .layout.arc_sizes import arc_sizes
 from .layout.face_tmesh import trace_face
 from .layout.glue import glue
 from .layout.quantize import Indivisible
+from .layout.separable import parts_of_arcs
 from .layout.together import divisible_together
 from .options import MeshOptions
 from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
@@ -40,6 +41,7 @@ __all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
 T = TypeVar("T")
 
 GUIDE_QUADS = 700
+PART_QUADS = 100  # at least, of every part of an assembly
 BLOCKS = 12
 CROWDED = 0.5
 MANY_ARCS = 3_500
@@ -261,14 +263,13 @@ def _mesh(
     with watch.stage("glue"):
         tmesh = glue(model, faces.meshes, faces.tmeshes)
         size, user_size = arc_sizes(model, tmesh, sizes)
-    area = sum(_area(m) for m in faces.meshes)
-    guide_size = float(np.sqrt(area / GUIDE_QUADS))
+    extent, guide_size, arcs = _parts(tmesh, np.array([_area(m) for m in faces.meshes]))
     if surfaces.curved.any():
         watch.work += ARC_WORK * len(tmesh.length)
     with watch.stage("quantize"):
-        block = np.maximum(options.block_size * user_size, np.sqrt(area) * attempt.blocks / BLOCKS)
-        if len(block) > MANY_ARCS:
-            block = np.maximum(0.25 * block, user_size)  # the program is much harder where most arcs are shorter than a block
+        block = np.maximum(options.block_size * user_size, extent * attempt.blocks / BLOCKS)
+        # the program is much harder where most arcs are shorter than a block
+        block = np.where(arcs > MANY_ARCS, np.maximum(0.25 * block, user_size), block)
         wanted = np.where(size < CROWDED * user_size, size, block)
         if _known((*which, "sizes", wanted.tobytes()), seen):
             return None
@@ -282,6 +283,20 @@ def _mesh(
         if isinstance(surfaces, JoinedSurfaces):
             mesh = surfaces.owned(mesh)
     return tmesh, coarse, result, mesh
+
+
+def _parts(tmesh: TMesh, area: Float) -> tuple[Float, Float, Int]:
+    """For every arc, of the connected part of the model that it is in: a length, the guide edge, and the number of arcs.
+
+    A part of an assembly gets the blocks that it has alone, and its share of the guide cells, but not too few.
+    """
+    part = parts_of_arcs(tmesh)
+    in_part = np.zeros(len(area), np.int64)
+    for patch, sides in enumerate(tmesh.patches):
+        in_part[tmesh.patch_face[patch]] = part[sides[0][0][0]]
+    own = np.bincount(in_part, area)
+    quads = np.maximum(GUIDE_QUADS * (own / own.sum()), PART_QUADS)
+    return np.sqrt(own)[part], np.sqrt(own / quads)[part], np.bincount(part)[part]
 
 
 def _known(key: tuple[object, ...], seen: set[tuple[object, ...]]) -> bool:

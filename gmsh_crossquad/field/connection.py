@@ -64,8 +64,7 @@ class ConnectionOperators:
 
     def apply(self, z: Float) -> Float:
         """(e, 2) stiffness times z (e, 2)."""
-        product: Complex = self.stiffness @ _joined(z)
-        return _split(product)
+        return _split(np.asarray(self.stiffness @ _joined(z), complex))
 
     def load(self, z: Float) -> Float:
         """(f, 2) what the boundary values of z (e, 2) add to the right-hand side of the free edges."""
