@@ -101,6 +101,9 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
                 free_vertices[node] = True
                 continue
             element += _put_point(tag, node + 1, mesh.points[node], element)
+        for tag, row in model.vertex_twins:  # an element alone: a second node at the same place would be a crack
+            gmsh.model.mesh.addElementsByType(tag, POINT, [element], [int(mesh.vertex_node[row]) + 1])
+            element += 1
         for number, (tag, point) in enumerate(zip(alone, alone_points), start=len(mesh.points) + 1):
             element += _put_point(tag, number, point, element)
         for curve, nodes, places in zip(model.curves, mesh.curve_nodes, mesh.curve_parameters):
