@@ -46,6 +46,8 @@ def open_model(path: str | os.PathLike[str]) -> None:
             gmsh.open(os.fspath(path))
             if not gmsh.model.getEntities():
                 gmsh.model.occ.synchronize()
+            if any(gmsh.model.getType(*entity).startswith("Partition") for entity in gmsh.model.getEntities()):
+                gmsh.model.mesh.unpartition()  # parts of a mesh, not of the geometry
         except Exception as error:
             if type(error) is not Exception:
                 raise

@@ -218,6 +218,7 @@ def _wanted_faces() -> list[int]:
     groups = gmsh.model.getPhysicalGroups(2)
     tags = {abs(int(f)) for d, t in groups for f in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     tags = tags or {int(f) for _, f in gmsh.model.getEntities(2)}
+    tags = {f for f in tags if not gmsh.model.getType(2, f).startswith("Partition")}  # parts of a mesh, not of the geometry
     if not tags:
         raise GeometryError("no surfaces in the model", remedy="add a surface, for example a Plane Surface of a Curve Loop")
     return sorted(tags)
