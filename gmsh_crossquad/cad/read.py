@@ -92,7 +92,7 @@ def read_model(options: MeshOptions) -> Model:
         embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
     for f in tags:
         if not bounds[f] and gmsh.model.getType(2, f) == "Discrete surface":
-            remedy = "gmsh.model.mesh.createTopology() makes the boundaries of a mesh"
+            remedy = "gmsh.model.mesh.classifySurfaces() and createGeometry() make faces of triangles"
             raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
     inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
     curve_tags = list(dict.fromkeys(c for f in tags for c in bounds[f] + inside[f]))
