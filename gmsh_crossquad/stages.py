@@ -14,8 +14,9 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from .cad.background import background_meshes
+from .cad.curve_places import CurvePlaces
 from .cad.joined_surfaces import JoinedSurfaces, cad_surfaces
-from .cad.put import curve_points, vertex_points
+from .cad.put import vertex_points
 from .cad.read import read_model
 from .cad.sizes import target_sizes
 from .cad.validate import validate
@@ -33,7 +34,7 @@ from .layout.quantize import Indivisible
 from .layout.separable import parts_of_arcs
 from .layout.together import divisible_together
 from .options import MeshOptions
-from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
+from .records import AlignedField, FaceMesh, FaceTMesh, Guide, Int, Model, QuadMesh, TMesh
 from .watch import Watch
 
 __all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
@@ -276,7 +277,7 @@ def _mesh(
         coarse = coarse_divisions(model, tmesh, wanted)
         if _known((*which, "divisions", coarse.tobytes()), seen):
             return None
-    evaluate, vertices = _evaluator(model), vertex_points(model)
+    evaluate, vertices = CurvePlaces.find(model, surfaces), vertex_points(model)
     result = smooth_guide(model, surfaces, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
     with watch.stage("fill"):
         mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
@@ -304,10 +305,6 @@ def _known(key: tuple[object, ...], seen: set[tuple[object, ...]]) -> bool:
     known = key in seen
     seen.add(key)
     return known
-
-
-def _evaluator(model: Model) -> Callable[[int, Float], Float]:
-    return lambda curve, parameters: curve_points(model, curve, parameters)
 
 
 def _area(mesh: FaceMesh) -> float:

@@ -92,7 +92,7 @@ def read_model(options: MeshOptions) -> Model:
         embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
     for f in tags:
         if not bounds[f] and gmsh.model.getType(2, f) == "Discrete surface":
-            remedy = "gmsh.model.mesh.createTopology() makes the boundaries of a mesh"
+            remedy = "gmsh.model.mesh.classifySurfaces() and createGeometry() make faces of triangles"
             raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
     inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
     curve_tags = list(dict.fromkeys(c for f in tags for c in bounds[f] + inside[f]))
@@ -223,6 +223,7 @@ def _wanted_faces() -> list[int]:
     groups = gmsh.model.getPhysicalGroups(2)
     tags = {abs(int(f)) for d, t in groups for f in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     tags = tags or {int(f) for _, f in gmsh.model.getEntities(2)}
+    tags = {f for f in tags if not gmsh.model.getType(2, f).startswith("Partition")}  # parts of a mesh, not of the geometry
     if not tags:
         raise GeometryError("no surfaces in the model", remedy="add a surface, for example a Plane Surface of a Curve Loop")
     return sorted(tags)
