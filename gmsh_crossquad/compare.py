@@ -113,8 +113,8 @@ def _face_area(model: Model, row: int) -> float:
 
 
 def _off_faces(points: Float, mesh: MeshArrays, model: Model, surfaces: Surfaces) -> int:
-    """Nodes of quads that are on no curved or plane face of a model with curved ones: first on the face with the tag of their
-    surface, then on any."""
+    """Nodes of quads that are on no curve and no face of a model with curved ones: of the faces first that with the tag of their
+    surface, then any."""
     if not surfaces.curved.any() or not len(mesh.quads):
         return 0
     row = {tag: f for f, face in enumerate(model.faces) for tag in face.tags}
@@ -126,6 +126,10 @@ def _off_faces(points: Float, mesh: MeshArrays, model: Model, surfaces: Surfaces
     feet = surfaces.feet(face[known], points[node[known]])
     far[known] = np.linalg.norm(feet - points[node[known]], axis=1) > _ON_FACE
     left = node[far]
+    curves = [c for c in model.curves if len(c.points) > 1]
+    if len(left) and curves:  # the CAD may have a curve off its faces; its nodes are right on the one as on the others
+        ends = np.concatenate([c.points[:-1] for c in curves]), np.concatenate([c.points[1:] for c in curves])
+        left = left[_distance(points[left], *ends)[0] > _ON_CURVE]
     wanted = left[:: max(1, -(-len(left) // _LOOKED_UP))]
     for f in range(len(model.faces)):
         if not len(wanted):

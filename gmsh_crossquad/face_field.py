@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .field.surface_mesh import SurfaceMesh
+from .field.surface_mesh import SurfaceMesh, surface_of
 from .records import AlignedField, FaceMesh, Float, Int, Model
 
 __all__ = ["FaceField", "Singularity", "face_field", "singularities_of"]
@@ -151,7 +151,7 @@ class FaceField:
 def face_field(model: Model, mesh: FaceMesh, aligned: AlignedField) -> FaceField:
     """The field of a face in the user's coordinates."""
     face = model.faces[mesh.face]
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     a, b = mesh.points[surface.edges[:, 0]], mesh.points[surface.edges[:, 1]]
     own = surface.edge_normal if face.curved else None
     normal = face.normal if own is None else own

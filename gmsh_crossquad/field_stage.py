@@ -20,7 +20,7 @@ from .field.compatibility import Incompatible, Misfit, quarter_text
 from .field.corners import boundary_indices
 from .field.edge_frames import EdgeFrames
 from .field.pipeline import aligned_field
-from .field.surface_mesh import SurfaceMesh
+from .field.surface_mesh import surface_of
 from .options import MeshOptions
 from .records import AlignedField, Bool, CrossField, FaceMesh, Float, Int, Model
 from .source.base import FieldSource
@@ -124,7 +124,7 @@ def _seeds(model: Model, whole: FieldSource) -> tuple[Float, ...]:
 def edge_frames(model: Model, mesh: FaceMesh) -> EdgeFrames:
     """Where the sources are asked for the field of a face."""
     face = model.faces[mesh.face]
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     own = surface.edge_normal if face.curved else None
     normal = np.broadcast_to(face.normal, (len(surface.edges), 3)) if own is None else own
     points = model.origin + model.scale * face.world(mesh.points)
@@ -249,7 +249,7 @@ def _named(model: Model, mesh: FaceMesh, misfit: Misfit) -> FieldError:
 
 def changes_of(model: Model, mesh: FaceMesh, index: Int, aligned: AlignedField) -> list[str]:
     """Notes on indices that were changed."""
-    on = SurfaceMesh(mesh.points, mesh.triangles).boundary_vertex
+    on = surface_of(mesh).boundary_vertex
     notes = []
     for v in np.flatnonzero(on & (aligned.index != index)).tolist():
         old, new = quarter_text(int(index[v])), quarter_text(int(aligned.index[v]))

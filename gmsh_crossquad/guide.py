@@ -16,7 +16,7 @@ from .fill.numbering import guide_chords
 from .fill.pipeline import poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
-from .layout.quantize import quantize
+from .layout.quantize import Indivisible, quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
@@ -68,11 +68,28 @@ def coarse_divisions(model: Model, tmesh: TMesh, block: Float) -> Int:
     ------
     LayoutError
     """
-    coarse = quantize(model, tmesh, tmesh.length / block).divisions
+    coarse = _quantized(model, tmesh, tmesh.length / block)
     wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
     if wrong:
         raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
     return coarse
+
+
+def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
+    """Divisions of the arcs; blocks on a curve with prescribed nodes are no more than its segments, also where they are large."""
+    coarse = quantize(model, tmesh, target).divisions
+    most = {c: len(curve.spacing) - 1 for c, curve in enumerate(model.curves) if curve.spacing is not None}
+    over = [c for c, n in most.items() if coarse[tmesh.pieces[c]].sum() > n]
+    if not over:
+        return coarse
+    try:
+        return quantize(model, tmesh, target, at_most=most).divisions
+    except Indivisible as error:
+        tag, n = model.curves[over[0]].tag, most[over[0]]
+        raise LayoutError(
+            f"the layout cannot have as few divisions as prescribed (curve {tag}: {n})",
+            remedy="raise the Transfinite Curve counts or leave them out",
+        ) from error
 
 
 def smooth_guide(
@@ -81,7 +98,7 @@ def smooth_guide(
     tmesh: TMesh,
     coarse: Int,
     size: Float,
-    guide_size: float,
+    guide_size: Float,
     evaluate: Evaluate,
     vertices: Float,
     watch: Watch,
@@ -93,7 +110,7 @@ def smooth_guide(
     ----------
     coarse : (a,) int64
     size : (a,) float64, scaled
-    guide_size : float, scaled
+    guide_size : (a,) float64, scaled
     evaluate, vertices
         As for `fill.pipeline.fill`.
     watch : Watch

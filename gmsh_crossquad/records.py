@@ -175,6 +175,8 @@ class Model:
         Names of the physical surfaces that hold each face; empty where nobody has read them.
     ignored_curves : tuple of int
         Gmsh tags of the curves that are left out because faces go on smoothly across them.
+    vertex_twins : tuple of (int, int)
+        Gmsh tags of CAD vertices that a curve without length joins to another one, with the row of that one.
     """
 
     name: str
@@ -189,6 +191,7 @@ class Model:
     point_names: tuple[tuple[int, str], ...] = ()
     face_names: tuple[tuple[str, ...], ...] = ()
     ignored_curves: tuple[int, ...] = ()
+    vertex_twins: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,14 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from .cad.background import background_meshes
+from .cad.curve_places import CurvePlaces
 from .cad.joined_surfaces import JoinedSurfaces, cad_surfaces
-from .cad.put import curve_points, vertex_points
+from .cad.put import vertex_points
 from .cad.read import read_model
 from .cad.sizes import target_sizes
 from .cad.validate import validate
 from .errors import CrossQuadError, LayoutError, MeshError
-from .field.surface_mesh import SurfaceMesh
+from .field.surface_mesh import surface_of
 from .field_stage import Rule, Wishes, changes_of, field_of_face, located, wishes
 from .fill.curve_fit import curve_fit
 from .fill.pipeline import fill
@@ -30,9 +31,10 @@ from .layout.arc_sizes import arc_sizes
 from .layout.face_tmesh import trace_face
 from .layout.glue import glue
 from .layout.quantize import Indivisible
+from .layout.separable import parts_of_arcs
 from .layout.together import divisible_together
 from .options import MeshOptions
-from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
+from .records import AlignedField, FaceMesh, FaceTMesh, Guide, Int, Model, QuadMesh, TMesh
 from .watch import Watch
 
 __all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
@@ -40,6 +42,7 @@ __all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
 T = TypeVar("T")
 
 GUIDE_QUADS = 700
+PART_QUADS = 100  # at least, of every part of an assembly
 BLOCKS = 12
 CROWDED = 0.5
 MANY_ARCS = 3_500
@@ -261,27 +264,40 @@ def _mesh(
     with watch.stage("glue"):
         tmesh = glue(model, faces.meshes, faces.tmeshes)
         size, user_size = arc_sizes(model, tmesh, sizes)
-    area = sum(_area(m) for m in faces.meshes)
-    guide_size = float(np.sqrt(area / GUIDE_QUADS))
+    extent, guide_size, arcs = _parts(tmesh, np.array([_area(m) for m in faces.meshes]))
     if surfaces.curved.any():
         watch.work += ARC_WORK * len(tmesh.length)
     with watch.stage("quantize"):
-        block = np.maximum(options.block_size * user_size, np.sqrt(area) * attempt.blocks / BLOCKS)
-        if len(block) > MANY_ARCS:
-            block = np.maximum(0.25 * block, user_size)  # the program is much harder where most arcs are shorter than a block
+        block = np.maximum(options.block_size * user_size, extent * attempt.blocks / BLOCKS)
+        # the program is much harder where most arcs are shorter than a block
+        block = np.where(arcs > MANY_ARCS, np.maximum(0.25 * block, user_size), block)
         wanted = np.where(size < CROWDED * user_size, size, block)
         if _known((*which, "sizes", wanted.tobytes()), seen):
             return None
         coarse = coarse_divisions(model, tmesh, wanted)
         if _known((*which, "divisions", coarse.tobytes()), seen):
             return None
-    evaluate, vertices = _evaluator(model), vertex_points(model)
+    evaluate, vertices = CurvePlaces.find(model, surfaces), vertex_points(model)
     result = smooth_guide(model, surfaces, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
     with watch.stage("fill"):
         mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
         if isinstance(surfaces, JoinedSurfaces):
             mesh = surfaces.owned(mesh)
     return tmesh, coarse, result, mesh
+
+
+def _parts(tmesh: TMesh, area: Float) -> tuple[Float, Float, Int]:
+    """For every arc, of the connected part of the model that it is in: a length, the guide edge, and the number of arcs.
+
+    A part of an assembly gets the blocks that it has alone, and its share of the guide cells, but not too few.
+    """
+    part = parts_of_arcs(tmesh)
+    in_part = np.zeros(len(area), np.int64)
+    for patch, sides in enumerate(tmesh.patches):
+        in_part[tmesh.patch_face[patch]] = part[sides[0][0][0]]
+    own = np.bincount(in_part, area)
+    quads = np.maximum(GUIDE_QUADS * (own / own.sum()), PART_QUADS)
+    return np.sqrt(own)[part], np.sqrt(own / quads)[part], np.bincount(part)[part]
 
 
 def _known(key: tuple[object, ...], seen: set[tuple[object, ...]]) -> bool:
@@ -291,12 +307,8 @@ def _known(key: tuple[object, ...], seen: set[tuple[object, ...]]) -> bool:
     return known
 
 
-def _evaluator(model: Model) -> Callable[[int, Float], Float]:
-    return lambda curve, parameters: curve_points(model, curve, parameters)
-
-
 def _area(mesh: FaceMesh) -> float:
-    return float(SurfaceMesh(mesh.points, mesh.triangles).area.sum())
+    return float(surface_of(mesh).area.sum())
 
 
 def _attempts(wanted: Wishes, options: MeshOptions) -> tuple[Attempt, ...]:

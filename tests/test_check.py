@@ -265,6 +265,17 @@ def test_a_node_beside_a_curved_face_is_a_fault(entity):
     assert compared_tube(model, surface, mesh).faults == ("3 nodes are not on the faces of the model",)
 
 
+def test_a_node_on_a_curve_that_is_off_its_face_is_right():
+    model, surface, mesh = tube_arrays()
+    rim = np.unique(mesh.lines)
+    wide = np.array([1.001, 1.001, 1.0])
+    mesh.points[rim] = model.origin + wide * (mesh.points[rim] - model.origin)
+    assert f"{len(rim)} nodes are not on the faces of the model" in compared_tube(model, surface, mesh).faults
+    curves = tuple(replace(c, points=c.points * wide) for c in model.curves)
+    off = replace(model, curves=curves, vertices=model.vertices * wide)
+    assert compared_tube(off, surface, mesh).faults == ()
+
+
 def test_a_tube_that_is_too_coarse_lacks_area():
     # a hexagonal prism lacks 4.5 %, and more where its free edges bound what may be cut off
     model, surface, guide, evaluate = tube(3, 1)

@@ -108,7 +108,7 @@ def test_chords_of_the_l_shape():
 def test_chord_divisions_follow_the_size(size):
     coarse = np.ones(10, np.int64)
     chords = find_chords(TMESH, quotient(TMESH, coarse))
-    d = chord_divisions(MODEL, TMESH, coarse, chords, np.full(10, size), UNIT / 3)
+    d = chord_divisions(MODEL, TMESH, coarse, chords, np.full(10, size), np.full(10, UNIT / 3))
     assert (d.guide * d.fine == round(UNIT / size)).all() or (np.abs(UNIT / (d.guide * d.fine) / size - 1) < 0.3).all()
     assert (d.guide <= 3).all()
 
@@ -120,7 +120,7 @@ def test_prescribed_counts_are_exact():
     model = replace(MODEL, curves=tuple(curves))
     coarse = np.ones(10, np.int64)
     chords = find_chords(TMESH, quotient(TMESH, coarse))
-    d = chord_divisions(model, TMESH, coarse, chords, np.full(10, UNIT / 3), UNIT / 3)
+    d = chord_divisions(model, TMESH, coarse, chords, np.full(10, UNIT / 3), np.full(10, UNIT / 3))
     assert arc_divisions(chords, d.guide * d.fine)[2] == 7
 
 
@@ -135,7 +135,7 @@ def test_contradicting_counts_are_named():
     chords = find_chords(TMESH, quotient(TMESH, coarse))
     # left side (5) = lower row + upper row, but the lower row has 7 and the upper row 3
     with pytest.raises(LayoutError, match="contradict"):
-        chord_divisions(model, TMESH, coarse, chords, np.full(10, UNIT / 3), UNIT / 3)
+        chord_divisions(model, TMESH, coarse, chords, np.full(10, UNIT / 3), np.full(10, UNIT / 3))
 
 
 def test_the_l_shape_has_three_blocks_and_straight_places():

@@ -110,7 +110,7 @@ def test_no_guide_cell_turns_much(name: str) -> None:
     model, _, _, _, tmesh = traced(name)
     coarse = quantize(model, tmesh, tmesh.length).divisions
     chords = find_chords(tmesh, quotient(tmesh, coarse))
-    found = chord_divisions(model, tmesh, coarse, chords, np.full(len(tmesh.length), 1.0), 1.0)
+    found = chord_divisions(model, tmesh, coarse, chords, *[np.full(len(tmesh.length), 1.0)] * 2)
     guide = arc_divisions(chords, found.guide)
     complex_ = quotient(tmesh, guide)
     assert problems(model, tmesh, complex_) == []

@@ -36,7 +36,7 @@ def test_formula_1_has_a_square():
     assert energies[-1] < 1e-9
     mass = np.bincount(mesh.triangle_edges.ravel(), np.repeat(mesh.area / 3, 3), len(mesh.edges))[operators.free]
     printed = factor((operators.inner + sp.diags(mass / (2 * epsilon**2))).tocsc())
-    inside = printed.solve(-(operators.coupling @ z[operators.fixed, 0]))
+    inside = printed.solve(operators.load(z[:, 0]))
     middle = np.argmin(np.abs(middles(mesh)[operators.free]))
     assert inside[middle] < 0.02
 

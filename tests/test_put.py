@@ -10,6 +10,7 @@ import gmsh
 import numpy as np
 import pytest
 
+from gmsh_crossquad import mesh
 from gmsh_crossquad.cad.put import curve_points, put_mesh, vertex_points
 from gmsh_crossquad.cad.read import read_model
 from gmsh_crossquad.errors import MeshError
@@ -214,3 +215,22 @@ def test_a_discrete_curve_is_its_polyline(session: None) -> None:
     want = 0.5 * (curve.points[0] + curve.points[1]) * model.scale + model.origin
     assert tag == curve.tag
     np.testing.assert_allclose(got[0], want, atol=1e-14)
+
+
+def test_both_ends_of_a_curve_without_length_carry_the_node(session):
+    geo = gmsh.model.geo
+    tags = [geo.addPoint(*p, 0) for p in ((0, 0), (1, 0), (1, 1), (1 - 1e-10, 1), (0, 1))]
+    bend = geo.addSpline([tags[3], geo.addPoint(0.5, 1.1, 0), tags[4]])
+    lines = [geo.addLine(tags[i], tags[(i + 1) % 5]) for i in (0, 1, 2)]
+    face = geo.addPlaneSurface([geo.addCurveLoop([*lines, bend, geo.addLine(tags[4], tags[0])])])
+    geo.synchronize()
+    groups = [gmsh.model.addPhysicalGroup(0, [tags[i]]) for i in (2, 3)]
+    gmsh.model.addPhysicalGroup(2, [face])
+    mesh(size=0.25)
+    (one,), place = gmsh.model.mesh.getNodesForPhysicalGroup(0, groups[0])
+    (two,), _ = gmsh.model.mesh.getNodesForPhysicalGroup(0, groups[1])
+    assert one == two
+    assert np.allclose(place, [1, 1, 0])
+    points = gmsh.model.mesh.getNodes()[1].reshape(-1, 3)
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.eye(len(points))
+    assert apart.min() > 0.02  # no crack

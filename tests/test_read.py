@@ -607,3 +607,38 @@ def test_angles_and_areas_do_not_depend_on_the_position(turn, tilt, slide, size)
     assert area(model) == pytest.approx(size**2 * 4.5, rel=1e-9)
     assert np.degrees(sector_angles(model, 0)[0]).sum() == pytest.approx(540.0)
     assert np.degrees(sector_angles(model, 0)[0]).max() == pytest.approx(180 + np.degrees(np.arctan(3)), abs=1e-6)
+
+
+# ---- curves without length
+
+
+def test_an_edge_that_the_cad_calls_a_point_is_left_out():
+    occ = gmsh.model.occ
+    side = occ.addLine(occ.addPoint(9e-8, 0, 0), occ.addPoint(1, 0, 0.5))  # within the kernel's tolerance of the axis
+    occ.revolve([(1, side)], 0, 0, 0, 0, 0, 1, np.pi / 2)
+    occ.synchronize()
+    assert [gmsh.model.getType(1, c) for _, c in gmsh.model.getEntities(1)].count("Unknown") == 1
+    model = read()
+    assert sorted(gmsh.model.getType(1, c.tag) for c in model.curves) == ["Circle", "Line", "Line"]
+    assert [len(loop) for loop in model.faces[0].loops] == [3]
+    assert model.vertex_twins == () and model.notes == ()
+
+
+@pytest.mark.parametrize("asked", [0, 1])
+def test_ends_of_a_curve_without_length_become_one_vertex(asked):
+    points = [(0, 0), (1, 0), (1, 1), (1 - 1e-10, 1), (0, 1)]
+    built_in(points, [[0, 1, 2, 3, 4]])
+    pair = [3, 4]  # tags of the two points at (1, 1)
+    gmsh.model.addPhysicalGroup(0, [pair[asked]], name="corner")
+    model = read()
+    stays = model.vertex_tags.tolist().index(pair[asked])
+    assert model.vertex_twins == ((pair[1 - asked], stays),)
+    assert len(model.curves) == len(model.vertices) == 4
+    assert model.vertex_ports.tolist() == [v == stays for v in range(4)]
+    assert area(model) == pytest.approx(1.0, abs=1e-9)
+    assert any("without length" in note for note in model.notes)
+
+
+def test_a_short_curve_with_a_length_is_kept():
+    built_in([(0, 0), (1, 0), (1, 1), (1 - 1e-7, 1), (0, 1)], [[0, 1, 2, 3, 4]])
+    assert len(read().curves) == 5

@@ -12,7 +12,7 @@ from __future__ import annotations
 import gmsh
 import numpy as np
 
-from ..field.surface_mesh import SurfaceMesh
+from ..field.surface_mesh import surface_of
 from ..records import FaceMesh, Float, Model
 from .charts import Charts
 from .joined_surfaces import split
@@ -39,7 +39,7 @@ def edge_bending(model: Model, mesh: FaceMesh) -> Float:
         a parametrization.
     """
     face = model.faces[mesh.face]
-    edges = SurfaceMesh(mesh.points, mesh.triangles).edges
+    edges = surface_of(mesh).edges
     known = _at_points(model, mesh, mesh.points) if mesh.parts is None else _of_parts(model, mesh)
     if known is None:
         return np.full((len(edges), 3), np.nan)

@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import GeometryError, MeshError
 from ..formats import check_input
 from ..records import Float, Int
+from .discrete import classify
 from .onelab import forget_options
 from .session import gmsh_errors, options
 
@@ -46,6 +47,9 @@ def open_model(path: str | os.PathLike[str]) -> None:
             gmsh.open(os.fspath(path))
             if not gmsh.model.getEntities():
                 gmsh.model.occ.synchronize()
+            if any(gmsh.model.getType(*entity).startswith("Partition") for entity in gmsh.model.getEntities()):
+                gmsh.model.mesh.unpartition()  # parts of a mesh, not of the geometry
+            classify()
         except Exception as error:
             if type(error) is not Exception:
                 raise

@@ -20,7 +20,7 @@ import gmsh
 import numpy as np
 
 from ..errors import MeshError
-from ..field.surface_mesh import SurfaceMesh
+from ..field.surface_mesh import surface_of
 from ..records import Curve, Face, FaceMesh, Float, Int, Model
 from . import session
 from .joined_surfaces import cad_surfaces
@@ -38,7 +38,7 @@ KEPT_OPTIONS = {"General.AbortOnError": 0, "Mesh.ElementOrder": 1, "Mesh.MeshOnl
 def triangle_areas(mesh: FaceMesh) -> Float:
     """(m,) areas of the triangles of a background mesh."""
     if mesh.points.shape[1] == 3:
-        return SurfaceMesh(mesh.points, mesh.triangles).area
+        return surface_of(mesh).area
     a, b, c = (mesh.points[mesh.triangles[:, k]] for k in range(3))
     return 0.5 * ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0]))
 

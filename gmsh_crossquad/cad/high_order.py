@@ -14,8 +14,9 @@ from ..errors import InputError, MeshError
 from ..fill.high_order import high_order, turned_over
 from ..records import Float, Int, Model, QuadMesh
 from ..surfaces import Surfaces
+from .curve_places import CurvePlaces
 from .joined_surfaces import JoinedSurfaces
-from .put import curve_points, on_faces
+from .put import on_faces
 from .session import gmsh_errors
 
 __all__ = ["element_order", "raise_order"]
@@ -71,7 +72,7 @@ def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, *,
     """
     if order == 1:
         return ()
-    new = high_order(model, surfaces, mesh, order, lambda row, t: curve_points(model, row, t), incomplete=incomplete)
+    new = high_order(model, surfaces, mesh, order, CurvePlaces.find(model, surfaces), incomplete=incomplete)
     kind, kept = INCOMPLETE if incomplete else (QUADS[order], (order + 1) ** 2)
     quads = new.quads[:, :kept]
     n = len(mesh.points)

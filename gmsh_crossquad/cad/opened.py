@@ -52,8 +52,11 @@ def opened(points: Float, triangles: Int, cuts: Int, vertex: Int, offset: Int) -
     order = np.argsort(owner, kind="stable")
     local = np.empty(len(points), np.int64)
     bounds = np.searchsorted(owner[order], np.arange(len(offset)))
+    triangle_order = np.argsort(triangle_owner, kind="stable")
+    triangle_bounds = np.searchsorted(triangle_owner[triangle_order], np.arange(len(offset)))
     for row in range(len(offset) - 1):
         mine = order[bounds[row] : bounds[row + 1]]
         local[mine] = np.arange(len(mine))
         inside = np.where(source[mine] >= 0, source[mine] - offset[row], -1)
-        yield SurfaceMesh(points[mine], local[triangles[triangle_owner == row]]), inside
+        own = triangle_order[triangle_bounds[row] : triangle_bounds[row + 1]]
+        yield SurfaceMesh(points[mine], local[triangles[own]]), inside

@@ -30,8 +30,8 @@ __all__ = ["read_model"]
 
 CONVEX = ("Line", "Circle", "Ellipse")  # cannot meet themselves
 NEARLY_FLAT = 1e-2  # height over extent of the boundary of a plane surface that is meshed as a curved one
-NO_EXTENT = 1e-9  # of the model: shorter open curves are points
-COINCIDENT = 1e-12  # of the model: shorter closed curves are degenerate
+NO_EXTENT = 1e-9  # of the model: shorter curves are points
+COLLAPSED = 1e-6  # of the model: edges that the CAD itself calls a point; kernels draw them within the tolerance of the vertex
 
 
 @dataclass
@@ -92,7 +92,7 @@ def read_model(options: MeshOptions) -> Model:
         embedded = {f: gmsh.model.mesh.getEmbedded(2, f) for f in tags}
     for f in tags:
         if not bounds[f] and gmsh.model.getType(2, f) == "Discrete surface":
-            remedy = "gmsh.model.mesh.createTopology() makes the boundaries of a mesh"
+            remedy = "gmsh.model.mesh.classifySurfaces() and createGeometry() make faces of triangles"
             raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
     inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
     curve_tags = list(dict.fromkeys(c for f in tags for c in bounds[f] + inside[f]))
@@ -111,7 +111,7 @@ def read_model(options: MeshOptions) -> Model:
             r.untied = r.points is not tied
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
-    kept = _without_points([r for r in raw if not _degenerate(r, scale)], scale)
+    kept, twins = _without_points([r for r in raw if not _degenerate(r, scale)], vertices, points, scale)
     planes = _planes(tags, signs, {r.tag: r.points for r in kept}, origin, scale)
     needed = {abs(int(c)) for d, t in gmsh.model.getPhysicalGroups(1) for c in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     needed |= {c for f in tags for c in inside[f]}
@@ -150,6 +150,8 @@ def read_model(options: MeshOptions) -> Model:
             faces.append(_face(f, bound, embed, points[f], curves, row, place, plane))
     groups_of = _group_names(2)
     asked = _physical_points() | {vertices.tags[p] for f in tags for p in points[f]}
+    asked |= {kept_tag for tag, kept_tag in twins.items() if tag in asked}
+    twin_rows = [(tag, vertices.tags.index(kept_tag)) for tag, kept_tag in sorted(twins.items()) if kept_tag in vertices.tags]
     return Model(
         name=gmsh.model.getCurrent(),
         origin=origin,
@@ -159,10 +161,11 @@ def read_model(options: MeshOptions) -> Model:
         vertex_ports=np.array([t in asked for t in vertices.tags], bool),
         curves=curves,
         faces=tuple(faces),
-        notes=_notes(kept, groups),
+        notes=_notes(kept, groups, len(twin_rows)),
         point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
         ignored_curves=tuple(sorted(c for group in groups for c in group.ignored)),
+        vertex_twins=tuple(twin_rows),
     )
 
 
@@ -189,9 +192,11 @@ def _without_joints(
     return kept, vertices, points
 
 
-def _notes(kept: list[_Raw], groups: tuple[Group, ...]) -> tuple[str, ...]:
+def _notes(kept: list[_Raw], groups: tuple[Group, ...], twins: int) -> tuple[str, ...]:
     """What the user should know about the model."""
     notes = [f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied]
+    if twins:
+        notes.append(f"{twins} curve{'s' if twins > 1 else ''} without length: the ends became one node")
     if linked():
         notes.append("the mesh is not periodic; periodic links of the model are taken off")
     ignored = sum(len(group.ignored) for group in groups)
@@ -218,6 +223,7 @@ def _wanted_faces() -> list[int]:
     groups = gmsh.model.getPhysicalGroups(2)
     tags = {abs(int(f)) for d, t in groups for f in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     tags = tags or {int(f) for _, f in gmsh.model.getEntities(2)}
+    tags = {f for f in tags if not gmsh.model.getType(2, f).startswith("Partition")}  # parts of a mesh, not of the geometry
     if not tags:
         raise GeometryError("no surfaces in the model", remedy="add a surface, for example a Plane Surface of a Curve Loop")
     return sorted(tags)
@@ -248,16 +254,23 @@ def _read_curve(tag: int, vertices: _Vertices) -> _Raw:
 
 
 def _degenerate(raw: _Raw, scale: float) -> bool:
-    """A closed curve without extent, as at the pole of a sphere."""
-    return raw.ends[0] == raw.ends[1] and bool(np.ptp(raw.points, axis=0).max() <= COINCIDENT * scale)
+    """A closed curve without extent, as at a pole; Gmsh has no type for the edges that OpenCASCADE calls degenerate."""
+    limit = COLLAPSED if raw.kind == "Unknown" else NO_EXTENT
+    return raw.ends[0] == raw.ends[1] and bool(np.ptp(raw.points, axis=0).max() <= limit * scale)
 
 
-def _without_points(raw: list[_Raw], scale: float) -> list[_Raw]:
-    """The curves but open ones without extent, whose two vertices become one."""
+def _without_points(
+    raw: list[_Raw], vertices: _Vertices, points: dict[int, list[int]], scale: float
+) -> tuple[list[_Raw], dict[int, int]]:
+    """The curves but open ones without extent, whose two vertices become one; the rows of `points` are changed.
+
+    The first of the vertices stays, one in a physical group before others; the tags of the others are returned with its tag.
+    """
     short = [r for r in raw if np.ptp(r.points, axis=0).max() <= NO_EXTENT * scale and r.ends[0] != r.ends[1]]
     if not short:
-        return raw
+        return raw, {}
     same: dict[int, int] = {}
+    asked = _physical_points()
 
     def first(v: int) -> int:
         while v in same:
@@ -265,13 +278,16 @@ def _without_points(raw: list[_Raw], scale: float) -> list[_Raw]:
         return v
 
     for r in short:
-        a, b = sorted((first(r.ends[0]), first(r.ends[1])))
-        if a != b:
-            same[b] = a
+        ends = {first(v) for v in r.ends}
+        if len(ends) == 2:
+            stays, goes = sorted(ends, key=lambda v: (vertices.tags[v] not in asked, v))
+            same[goes] = stays
     kept = [r for r in raw if not any(r is s for s in short)]
     for r in kept:
         r.ends = [first(v) for v in r.ends]
-    return kept
+    for rows in points.values():
+        rows[:] = [first(v) for v in rows]
+    return kept, {vertices.tags[v]: vertices.tags[first(v)] for v in same}
 
 
 def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Curve:

@@ -1,10 +1,11 @@
 """Nodes that the user's Transfinite Curve commands prescribe.
 
 Gmsh has no call that returns them, so they are measured: the curves are meshed once with an endless size and without
-minimum counts.  More than two segments on an open curve, or four on a closed one, are then prescribed (up to that many
-Gmsh makes itself, for instance where two curves bound a face); the parameters of the nodes hold count and progression.
-Only where that finds something the curves are meshed once more, with a small size: a curve that is long compared with
-it and has as few segments as before is prescribed to have them.
+minimum counts, all sizes made endless once more by the factor, which also scales those of a metric (that ignores the
+least size) but not prescribed counts.  More than two segments on an open curve, or four on a closed one, are then
+prescribed (up to that many Gmsh makes itself, for instance where two curves bound a face); the parameters of the nodes
+hold count and progression.  Only where that finds something the curves are meshed once more, with a small size: a curve
+that is long compared with it and has as few segments as before is prescribed to have them.
 
 The mesh and the options of the model are as before afterwards.
 """
@@ -21,14 +22,13 @@ from .session import MeshSnapshot, gmsh_errors, options
 
 __all__ = ["transfinite_parameters"]
 
-ENDLESS = 1e22
+ENDLESS, FACTOR = 1e22, 1e6
 OWN_OPEN, OWN_CLOSED = 2, 4  # segments that Gmsh makes itself, at most
 FINE_NODES = 2000  # in the second mesh, on all curves together
 PLAIN = {
     "General.AbortOnError": 0,  # homology that the user asks for fails on a mesh of curves
     "Mesh.MeshSizeFromPoints": 0,
     "Mesh.MeshSizeFromCurvature": 0,
-    "Mesh.MeshSizeFactor": 1,
     "Mesh.MinimumCircleNodes": 0,
     "Mesh.MinimumCurveNodes": 0,
     "Mesh.FlexibleTransfinite": 0,
@@ -63,7 +63,7 @@ def transfinite_parameters(lengths: dict[int, float], closed: Sequence[int], kin
     own = {tag: OWN_CLOSED if tag in set(closed) else OWN_OPEN for tag in lengths}
     snapshot = MeshSnapshot.take()
     try:
-        nodes = _mesh_curves(ENDLESS, list(lengths))
+        nodes = _mesh_curves(ENDLESS, list(lengths), FACTOR)
         found = {tag: nodes[tag] for tag in lengths if len(nodes[tag]) + 1 > own[tag]}
         if found:
             size = sum(lengths.values()) / FINE_NODES
@@ -76,9 +76,10 @@ def transfinite_parameters(lengths: dict[int, float], closed: Sequence[int], kin
     return {tag: np.concatenate([bounds[tag][0], found[tag], bounds[tag][1]]) for tag in found}
 
 
-def _mesh_curves(size: float, tags: Sequence[int]) -> dict[int, Float]:
+def _mesh_curves(size: float, tags: Sequence[int], factor: float = 1.0) -> dict[int, Float]:
     """Parameters of the inner nodes of curves, meshed with a uniform size."""
-    with gmsh_errors("meshing the curves"), options(**PLAIN, **{"Mesh.MeshSizeMin": size, "Mesh.MeshSizeMax": size}):
+    sizes = {"Mesh.MeshSizeMin": size, "Mesh.MeshSizeMax": size, "Mesh.MeshSizeFactor": factor}
+    with gmsh_errors("meshing the curves"), options(**PLAIN, **sizes):
         gmsh.model.mesh.generate(1)
         if not len(gmsh.model.mesh.getNodes(1)[0]):
             return dict.fromkeys(tags, np.zeros(0))

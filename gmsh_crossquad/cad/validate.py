@@ -44,6 +44,7 @@ def validate(model: Model) -> None:
             place = _user(model, curve.points[0])
             raise GeometryError("the curve has no length", entity=(1, curve.tag), location=place, remedy="remove it")
     for row, face in enumerate(model.faces):
+        _check_counts(model, face)
         if face.curved:
             continue  # Gmsh's triangulation of it is checked instead
         flat = {c: face.local(model.curves[c].points) for c in _curves(face)}
@@ -62,6 +63,18 @@ def _user(model: Model, point: Float) -> list[float]:
 
 def _curves(face: Face) -> list[int]:
     return list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
+
+
+def _check_counts(model: Model, face: Face) -> None:
+    """The boundary of a quad mesh has an even number of edges: 4 Q = 2 E_inside + E_boundary, embedded curves counting twice."""
+    counts = [model.curves[c].spacing for loop in face.loops for c, _ in loop]
+    total = sum(len(spacing) - 1 for spacing in counts if spacing is not None)
+    if total % 2 and all(spacing is not None for spacing in counts):
+        raise GeometryError(
+            f"the Transfinite counts of the boundary sum up to {total} edges, an odd number, which no quad mesh has",
+            entity=(2, face.tag),
+            remedy="change one of the Transfinite Curve counts by one or leave it out",
+        )
 
 
 def _check_area(model: Model, face: Face, flat: dict[int, Float]) -> None:

@@ -22,6 +22,7 @@ import scipy.sparse.linalg as spl
 
 from ..records import Float, Int
 from .surface_mesh import SurfaceMesh
+from .symmetric import part, shifted
 
 __all__ = ["FieldOperators", "factor"]
 
@@ -74,12 +75,7 @@ class FieldOperators:
     @cached_property
     def inner(self) -> sp.csc_matrix:
         """The stiffness among the free edges."""
-        return self.stiffness[self.free][:, self.free].tocsc()
-
-    @cached_property
-    def coupling(self) -> sp.csr_matrix:
-        """The stiffness between free (rows) and boundary edges (columns)."""
-        return self.stiffness[self.free][:, self.fixed]
+        return part(self.stiffness, self.free)
 
     @cached_property
     def _factors(self) -> Any:
@@ -92,12 +88,14 @@ class FieldOperators:
 
     def load(self, z: Float) -> Float:
         """(f, k) what the boundary values of z (e, k) add to the right-hand side of the free edges."""
-        out: Float = -(self.coupling @ z[self.fixed])
+        boundary = np.zeros_like(z)
+        boundary[self.fixed] = z[self.fixed]
+        out: Float = -(self.stiffness @ boundary)[self.free]
         return out
 
     def shifted(self, shift: Float, scale: float = 1.0) -> Any:
         """Factors of ``diag(shift) + scale * inner`` for a `shift` (f,)."""
-        return factor((sp.diags(shift) + scale * self.inner).tocsc())
+        return factor(shifted(self.inner, shift, scale))
 
     def difference(self, x: Float) -> Float:
         """(m, 3) value on edge k + 1 minus value on edge k."""
@@ -126,7 +124,7 @@ class FieldOperators:
         """
         x = np.zeros_like(boundary_values)
         x[self.fixed] = boundary_values[self.fixed]
-        right = -(self.coupling @ x[self.fixed])
+        right = -(self.stiffness @ x)[self.free]
         if correction is not None:
             load = [-self.divergence(r)[self.free] for r in correction.reshape(-1, *self.weight.shape)]
             right += load[0] if right.ndim == 1 else np.stack(load, axis=1)

@@ -20,7 +20,7 @@ from .relax import leave_corners, relax_singularities
 from .singularities import singular_vertices, snap_to_vertices
 from .smooth import smooth_field
 from .strong import split_strong
-from .surface_mesh import SurfaceMesh
+from .surface_mesh import SurfaceMesh, surface_of
 
 __all__ = ["aligned_field"]
 
@@ -73,7 +73,7 @@ def aligned_field(
         If the triangles are no oriented surface.
     LayoutError
     """
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     check_oriented(surface)
     operators = FieldOperators(surface)
     wanted = boundary_indices(mesh) if boundary_index is None else boundary_index

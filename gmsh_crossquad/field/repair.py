@@ -25,7 +25,7 @@ from .flux import vanish_flux
 from .operators import FieldOperators
 from .pair import add_pair
 from .singularities import move_index, shortest_path, singular_vertices
-from .surface_mesh import SurfaceMesh
+from .surface_mesh import SurfaceMesh, surface_of
 from .tangents import length
 
 __all__ = ["alternatives", "with_pairs"]
@@ -54,7 +54,7 @@ def alternatives(mesh: FaceMesh, aligned: AlignedField, held: Int, *, move: bool
     AlignedField
         Harmonic, with the changes in its `added` and `moved`.  None at all for a face without holes.
     """
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     aligner, clearance = _tools(surface, aligned)
     if not aligner.holes:
         return
@@ -90,7 +90,7 @@ def with_pairs(mesh: FaceMesh, aligned: AlignedField, places: Float) -> AlignedF
     AlignedField or None
         Checked, with the new vertices in its `added`; None where there is no room for the pairs.
     """
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     aligner = Aligner(surface, FieldOperators(surface), aligned.index)
     free = ~(surface.boundary_vertex | mesh.port)
     free[singular_vertices(surface, aligned.field.rotation)[0]] = False

@@ -12,9 +12,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..records import Bool, Float, Int
+from ..records import Bool, FaceMesh, Float, Int
 
-__all__ = ["SurfaceMesh"]
+__all__ = ["SurfaceMesh", "surface_of"]
 
 
 @dataclass(frozen=True)
@@ -276,3 +276,12 @@ class SurfaceMesh:
     def euler(self) -> int:
         """Euler characteristic."""
         return len(self.points) - len(self.edges) + len(self.triangles)
+
+
+def surface_of(mesh: FaceMesh) -> SurfaceMesh:
+    """The surface of a background mesh: made once, kept with the record, so that every stage uses the same topology."""
+    known: SurfaceMesh | None = vars(mesh).get("_surface")
+    if known is None:
+        known = SurfaceMesh(mesh.points, mesh.triangles)
+        vars(mesh)["_surface"] = known  # as `cached_property` does in a frozen record
+    return known

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import LayoutError
 from ..field.repair import alternatives
-from ..field.surface_mesh import SurfaceMesh
+from ..field.surface_mesh import surface_of
 from ..records import AlignedField, FaceMesh, FaceTMesh, Int, Model
 from .face_tmesh import trace_face
 from .glue import glue
@@ -77,7 +77,7 @@ def divisible(
         paired = None
     if paired is not None:
         return paired.fields[0], paired.tmeshes[0]
-    loops = SurfaceMesh(mesh.points, mesh.triangles).loops
+    loops = surface_of(mesh).loops
     worst = int(np.argmax(np.abs(aligned.flux))) if loops else -1
     around = f" (flux {aligned.flux[worst]:.3g} around a boundary loop)" if loops else ""
     raise LayoutError(

@@ -114,7 +114,7 @@ def chord_divisions(
     divisions: Int,
     chords: Chords,
     size: Float,
-    guide_size: float,
+    guide_size: Float,
     *,
     finer: Int | None = None,
     capped: bool = True,
@@ -127,8 +127,8 @@ def chord_divisions(
         Coarse divisions of the arcs.
     size : (a,) float64, scaled
         Target size along every arc.
-    guide_size : float, scaled
-        Smallest useful guide edge; the guide edge is at least the target size.
+    guide_size : (a,) float64, scaled
+        Smallest useful guide edge along every arc; the guide edge is at least the target size.
     finer : (n,) int64, optional
         Lower bounds on the guide cells per chord.
     capped : bool
@@ -141,7 +141,7 @@ def chord_divisions(
     """
     seg = segments(model, tmesh, divisions, chords)
     local = size[seg.arc]
-    guide, _ = _wanted(model, tmesh, seg, chords.n, np.maximum(local, guide_size), GUIDE_TURN, GUIDE_BEND, capped)
+    guide, _ = _wanted(model, tmesh, seg, chords.n, np.maximum(local, guide_size[seg.arc]), GUIDE_TURN, GUIDE_BEND, capped)
     if finer is not None:
         guide = np.maximum(guide, finer)
     total, least = _wanted(model, tmesh, seg, chords.n, local, TURN, BEND, capped)

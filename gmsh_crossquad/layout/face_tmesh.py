@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import LayoutError
-from ..field.surface_mesh import SurfaceMesh
+from ..field.surface_mesh import SurfaceMesh, surface_of
 from ..records import AlignedField, Bool, FaceMesh, FaceTMesh
 from .assemble import assemble
 from .divide import Divider
@@ -47,7 +47,7 @@ def trace_face(mesh: FaceMesh, aligned: AlignedField, extra_ports: Sequence[int]
     LayoutError
         If an index leaves no room for a block, a separatrix does not end, or a patch is not four-sided.
     """
-    surface = SurfaceMesh(mesh.points, mesh.triangles)
+    surface = surface_of(mesh)
     seed = mesh.port | (aligned.index != 0)
     seed[list(extra_ports)] = True
     loop = np.full(len(mesh.points), -1, np.int64)

@@ -58,19 +58,28 @@ def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
     quad_face = tmesh.patch_face[q.quad_patch]
     curve_keys = np.array(sorted(curve_edge), np.int64)
     curve_of_key = np.array([curve_edge[k] for k in curve_keys.tolist()], np.int64)
+    curves_of_face: list[list[int]] = [[] for _ in model.faces]
+    for c, use in enumerate(uses):
+        for f in use:
+            curves_of_face[f].append(c)
+    critical: list[list[tuple[int, int]]] = [[] for _ in model.faces]
+    for (f, node), value in tmesh.quads_at.items():
+        critical[f].append((node, value))
+    order = np.argsort(quad_face, kind="stable")
+    bounds = np.searchsorted(quad_face[order], np.arange(len(model.faces) + 1)).tolist()
+    expected, fans = np.full(n, 4), np.ones(n, np.int64)
     for f, face in enumerate(model.faces):
-        quads = q.quads[quad_face == f]
+        quads = q.quads[order[bounds[f] : bounds[f + 1]]]
         where = f"face {face.tag}: "
         if not len(quads):
             out.append(where + "no quads")
             continue
-        if any(len(set(x)) < 4 for x in quads.tolist()):
+        if (np.diff(np.sort(quads, axis=1), axis=1) == 0).any():
             out.append(where + "a quad with repeated vertices")
             continue
         edges, edge_rows = edges_of_quads(quads)
         count = np.bincount(edge_rows.ravel(), minlength=len(edges))
-        a, b = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
-        if len(np.unique(a * n + b)) != len(a):
+        if len(np.unique(quads * n + np.roll(quads, -1, axis=1))) != quads.size:
             out.append(where + "quads are not oriented alike")
         if (count > 2).any():
             out.append(where + "an edge with more than two quads")
@@ -83,43 +92,44 @@ def problems(model: Model, tmesh: TMesh, q: Quotient) -> list[str]:
         wanted[on_curve] = [uses[c][f] for c in curve_of_key[row[on_curve]].tolist()]
         if (wanted != count).any():
             out.append(where + "an edge on a curve is not used by its faces, or a free edge is on no curve")
-        if int(on_curve.sum()) != sum(len(chains[c]) - 1 for c in range(len(chains)) if uses[c][f]):
+        if int(on_curve.sum()) != sum(len(chains[c]) - 1 for c in curves_of_face[f]):
             out.append(where + "an edge of its curves is missing")
-        vertices = np.unique(quads)
+        vertices, corner = np.unique(quads, return_inverse=True)
+        corner = corner.ravel()
         euler = len(vertices) - len(edges) + len(quads)
         if euler != tmesh.euler[f]:
             out.append(where + f"Euler characteristic {euler} instead of {tmesh.euler[f]}")
-        # quads per vertex
-        expected = np.full(n, 4)
-        fans = np.ones(n, np.int64)
-        for c, chain in enumerate(chains):
-            if uses[c][f]:
-                expected[chain[1:-1]] = 2 * uses[c][f]
-                fans[chain[1:-1]] = uses[c][f]
+        # quads per vertex; what is expected of other vertices than these is put back below
+        touched = [vertices]
+        for c in curves_of_face[f]:
+            inside = chains[c][1:-1]
+            expected[inside] = 2 * uses[c][f]
+            fans[inside] = uses[c][f]
+            touched.append(np.array(inside, np.int64))
         at: dict[int, int] = {}
-        for (g, node), value in tmesh.quads_at.items():
-            if g == f:
-                v = int(q.vertex[node])
-                if v < 0:
-                    out.append(where + f"critical node {node} is lost")
-                    continue
-                if v in at:
-                    out.append(where + f"critical nodes {at[v]} and {node} are merged")
-                at[v] = node
-                expected[v] = value
-        valence = np.bincount(quads.ravel(), minlength=n)
-        wrong = vertices[valence[vertices] != expected[vertices]]
-        if len(wrong):
-            out.append(where + f"{len(wrong)} vertices with a wrong number of quads")
+        for node, value in critical[f]:
+            v = int(q.vertex[node])
+            if v < 0:
+                out.append(where + f"critical node {node} is lost")
+                continue
+            if v in at:
+                out.append(where + f"critical nodes {at[v]} and {node} are merged")
+            at[v] = node
+            expected[v] = value
+        valence = np.bincount(corner, minlength=len(vertices))
+        wrong = int((valence != expected[vertices]).sum())
+        if wrong:
+            out.append(where + f"{wrong} vertices with a wrong number of quads")
         # fans: corners of a vertex connected across interior, uncut edges
         twin_a, twin_b = _corner_links(quads, edge_rows, count, on_curve)
         m = quads.size
         label = connected_components(coo_array((np.ones(len(twin_a)), (twin_a, twin_b)), shape=(m, m)), directed=False)[1]
-        pairs = np.unique(np.stack([quads.ravel(), label], axis=1), axis=0)
-        n_fans = np.bincount(pairs[:, 0], minlength=n)
-        inner = vertices[~is_cad[vertices]]
-        if (n_fans[inner] != fans[inner]).any():
+        pairs = np.unique(corner * m + label)
+        n_fans = np.bincount(pairs // m, minlength=len(vertices))
+        if (n_fans != fans[vertices])[~is_cad[vertices]].any():
             out.append(where + "a vertex with a wrong number of fans")
+        back = np.concatenate([*touched, np.array(list(at), np.int64)])
+        expected[back], fans[back] = 4, 1
     return out
 
 

@@ -86,8 +86,8 @@ def _quick(mesh: SurfaceMesh, theta: Float, known: Bool) -> Bool:
 def _filled(mesh: SurfaceMesh, theta: Float, known: Bool) -> Float:
     """Angles (e,) that are harmonic between the known ones."""
     stiffness = ConnectionOperators(FieldOperators(mesh)).stiffness
-    z = np.stack([np.cos(4 * theta), np.sin(4 * theta)], axis=1)
-    free, given = (np.flatnonzero(np.repeat(mask, 2)) for mask in (~known, known))
-    right = -(stiffness[free][:, given] @ z.ravel()[given])
-    z.ravel()[free] = factor(stiffness[free][:, free].tocsc()).solve(right)
-    return np.where(known, theta, 0.25 * np.arctan2(z[:, 1], z[:, 0]))
+    z = np.exp(4j * theta)
+    free, given = np.flatnonzero(~known), np.flatnonzero(known)
+    right = -(stiffness[free][:, given] @ z[given])
+    z[free] = factor(stiffness[free][:, free].tocsc()).solve(right)
+    return np.where(known, theta, 0.25 * np.angle(z))
