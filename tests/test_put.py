@@ -234,3 +234,29 @@ def test_both_ends_of_a_curve_without_length_carry_the_node(session):
     points = gmsh.model.mesh.getNodes()[1].reshape(-1, 3)
     apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.eye(len(points))
     assert apart.min() > 0.02  # no crack
+
+
+def test_physical_curves_on_no_face_get_edges(session: None) -> None:
+    occ = gmsh.model.occ
+    square = occ.addRectangle(0, 0, 0, 1, 1)
+    corner = occ.addPoint(1, 1, 0)
+    occ.fragment([(2, square)], [(0, corner)])
+    occ.synchronize()
+    corner = gmsh.model.getEntitiesInBoundingBox(0.9, 0.9, -0.1, 1.1, 1.1, 0.1, 0)[0][1]
+    wire = occ.addLine(corner, occ.addPoint(1, 1, 2))
+    ring = occ.addCircle(5, 0, 0, 1)
+    occ.synchronize()
+    gmsh.model.addPhysicalGroup(1, [wire, ring], name="wires")
+    gmsh.model.addPhysicalGroup(2, [tag for _, tag in gmsh.model.getEntities(2)], name="plate")
+    mesh(size=0.1)
+    for tag, exact in ((wire, 2.0), (ring, 2 * np.pi)):
+        kinds, numbers, nodes = gmsh.model.mesh.getElements(1, tag)
+        assert kinds.tolist() == [LINE]
+        ends = np.array([gmsh.model.mesh.getNode(int(n))[0] for n in nodes[0]]).reshape(-1, 2, 3)
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        assert length.max() <= 0.12
+        assert exact * (1 - 0.12**2 / 20) <= length.sum() <= exact * (1 + 1e-12)
+        inner = np.unique(nodes[0])
+        assert len(inner) == len(numbers[0]) + (tag == wire)
+    all_nodes = gmsh.model.mesh.getNodes()[1].reshape(-1, 3)
+    assert np.sum(np.linalg.norm(all_nodes - [1, 1, 0], axis=1) < 1e-9) == 1  # the square's corner is the wire's end

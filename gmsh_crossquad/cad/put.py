@@ -21,6 +21,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..records import Float, Int, Model, QuadMesh
+from .loose import curve_places, loose_curves, loose_points
 from .periodic import unlink
 from .session import gmsh_errors
 
@@ -71,8 +72,8 @@ def vertex_points(model: Model) -> Float:
 def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | None = None) -> None:
     """Replace the mesh of the current Gmsh model.
 
-    All entities lose the mesh they had.  Vertices, curves and faces of `model` get nodes and elements; so do isolated
-    points in physical groups, as Gmsh does.
+    All entities lose the mesh they had.  Vertices, curves and faces of `model` get nodes and elements; so do points and
+    curves in physical groups that are on no face, as Gmsh does.  The edges of those curves are about as long as the mesh's.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
     """
     of_faces: Sequence[Float | None] = [None] * len(model.faces) if parameters is None else parameters
     with gmsh_errors("taking the mesh"):
-        alone = _isolated_points(model)
+        alone = loose_points(model)
         alone_points = [gmsh.model.getValue(0, tag, []) for tag in alone]
         gmsh.model.mesh.clear()
         unlink()
@@ -117,6 +118,12 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
         for tag, rows, _ in owned:
             quads = mesh.quads[rows] if tag > 0 else mesh.quads[rows][:, [0, 3, 2, 1]]
             element += _put_elements(abs(tag), QUAD, quads, element) if len(quads) else 0
+        if loose := loose_curves(model):
+            numbers = {tag: node + 1 for tag, node in zip(model.vertex_tags.tolist(), mesh.vertex_node.tolist()) if node >= 0}
+            sides = mesh.points[mesh.quads] - mesh.points[np.roll(mesh.quads, 1, axis=1)]
+            size = float(np.median(np.linalg.norm(sides, axis=-1)))
+            for tag in loose:
+                element += _put_loose_curve(tag, size, numbers, element)
 
 
 def on_faces(
@@ -160,16 +167,26 @@ def on_faces(
             yield signed, np.flatnonzero(mesh.quad_tag == signed), nodes[node_tags[row] == part.tag]
 
 
-def _isolated_points(model: Model) -> list[int]:
-    """Points in physical groups that bound no curve and are not in `model`."""
-    known = set(model.vertex_tags.tolist())
-    out = []
-    for _, group in gmsh.model.getPhysicalGroups(0):
-        for tag in gmsh.model.getEntitiesForPhysicalGroup(0, group).tolist():
-            if tag not in known and len(gmsh.model.getAdjacencies(0, tag)[0]) == 0:
-                known.add(tag)
-                out.append(tag)
-    return out
+def _put_loose_curve(tag: int, size: float, numbers: dict[int, int], element: int) -> int:
+    """Nodes and elements of a curve on no face; ends that have a node in `numbers` keep it, the others are added there.
+
+    Returns the number of elements.
+    """
+    places, points = curve_places(tag, size)
+    ends = [abs(end) for _, end in gmsh.model.getBoundary([(1, tag)], combined=False)]
+    made = 0
+    for end, point in zip(ends, (points[0], points[-1])):
+        if end not in numbers:
+            numbers[end] = int(gmsh.model.mesh.getMaxNodeTag()) + 1
+            made += _put_point(end, numbers[end], point, element + made)
+    first = int(gmsh.model.mesh.getMaxNodeTag()) + 1
+    inner = np.arange(first, first + len(places) - 2)
+    if not ends:  # closed, without a vertex
+        raise MeshError("the curve has no end point", entity=(1, tag), remedy="give it one, or take it out of its Physical Curve")
+    if len(inner):
+        gmsh.model.mesh.addNodes(1, tag, inner.astype(np.uint64), points[1:-1].ravel(), places[1:-1])
+    chain = np.array([numbers[ends[0]], *inner.tolist(), numbers[ends[-1]]]) - 1
+    return made + _put_elements(tag, LINE, np.stack([chain[:-1], chain[1:]], axis=1), element + made)
 
 
 def _put_point(tag: int, node: int, point: Float, element: int) -> int:
