@@ -34,7 +34,7 @@ from .layout.quantize import Indivisible
 from .layout.separable import parts_of_arcs
 from .layout.together import divisible_together
 from .options import MeshOptions
-from .records import AlignedField, FaceMesh, FaceTMesh, Guide, Int, Model, QuadMesh, TMesh
+from .records import AlignedField, FaceMesh, FaceTMesh, Float, Guide, Int, Model, QuadMesh, TMesh
 from .watch import Watch
 
 __all__ = ["StagesResult", "Watch", "block_mesh", "face_fields"]
