@@ -12,7 +12,8 @@ import numpy as np
 from ..errors import MeshError
 from ..field.surface_mesh import SurfaceMesh
 from ..records import FaceMesh, Float, Int, Model
-from .curved_mesh import CurvedMesh, boundary_of, triangulate_curved
+from .curved_mesh import triangulate_curved
+from .curved_triangles import CurvedMesh, boundary_of
 from .opened import opened
 from .seeds import InnerPoints
 from .tangents import end_tangents, opening

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +53,9 @@ class Outline:
     area: float
 
 
-def outline(model: Model, row: int, spacing: tuple[Float, ...], inner: InnerPoints) -> Outline:
+def outline(
+    model: Model, row: int, spacing: tuple[Float, ...], inner: InnerPoints, local: Callable[[Float], Float] | None = None
+) -> Outline:
     """Nodes and segments of face `row`.
 
     Parameters
@@ -63,6 +66,8 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...], inner: InnerPoin
         Arc lengths of the nodes of every curve, 0 and the length included.
     inner : InnerPoints
         Those of the face.
+    local : callable, optional
+        Takes points (n, 3) of the model to where the outline has them; default: the plane of the face.
     """
     face = model.faces[row]
     used = list(dict.fromkeys([c for loop in face.loops for c, _ in loop] + list(face.embedded_curves)))
@@ -84,7 +89,7 @@ def outline(model: Model, row: int, spacing: tuple[Float, ...], inner: InnerPoin
         n_points += len(between)
         n_segments += len(s) - 1
     seeded = inner.seed >= 0
-    points = np.concatenate([face.local(np.concatenate(world)), inner.points[seeded]])
+    points = np.concatenate([(local or face.local)(np.concatenate(world)), inner.points[seeded]])
     pairs = np.concatenate(segments)
     loops = []
     area = 0.0
