@@ -79,7 +79,7 @@ def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
     """Divisions of the arcs; blocks on a curve with prescribed nodes are no more than its segments, also where they are large."""
     coarse = quantize(model, tmesh, target).divisions
     most = {c: len(curve.spacing) - 1 for c, curve in enumerate(model.curves) if curve.spacing is not None}
-    over = [c for c, n in most.items() if coarse[tmesh.pieces[c]].sum() > n]
+    over = [c for c, n in most.items() if coarse[list(tmesh.pieces[c])].sum() > n]
     if not over:
         return coarse
     try:

@@ -32,6 +32,20 @@ def test_large_prescribed_edges_with_a_small_size():
     assert mesh(size=0.02).quality.quads == 9
 
 
+def test_large_prescribed_edges_of_a_side_with_several_blocks():
+    gmsh.model.add("L")
+    occ = gmsh.model.occ
+    corners = [occ.addPoint(x, y, 0) for x, y in ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2))]
+    sides = [occ.addLine(p, q) for p, q in zip(corners, corners[1:] + corners[:1])]
+    occ.addPlaneSurface([occ.addCurveLoop(sides)])
+    occ.synchronize()
+    gmsh.model.mesh.setTransfiniteCurve(sides[0], 4)  # blocks at its size would be more
+    mesh(size=0.02)
+    assert len(gmsh.model.mesh.getElements(1, sides[0])[1][0]) == 3
+    parts = [len(gmsh.model.mesh.getElements(1, side)[1][0]) for side in (sides[2], sides[4])]
+    assert sum(parts) == 3
+
+
 def test_an_anisotropic_background_mesh_prescribes_nothing():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]], float).reshape(2, 3, 3)
     metric = np.diag([1 / 0.05**2, 1 / 0.1**2, 1.0]).ravel()
