@@ -13,10 +13,12 @@ from .cad.put import put_mesh
 from .cad.session import MeshSnapshot, gmsh_errors, guest
 from .errors import InputError
 from .face_field import face_field
+from .faces_stage import face_fields
 from .field_result import FieldResult
 from .result import MeshResult
 from .session_options import session_options
-from .stages import Watch, block_mesh, face_fields
+from .stages import block_mesh
+from .watch import Watch
 
 __all__ = ["cross_field", "mesh"]
 

@@ -7,12 +7,13 @@ import pytest
 from gmsh_crossquad.cad.background import background_meshes
 from gmsh_crossquad.cad.read import read_model
 from gmsh_crossquad.errors import CrossQuadError, FieldError
+from gmsh_crossquad.faces_stage import face_fields
 from gmsh_crossquad.field_stage import field_of_face, wishes
 from gmsh_crossquad.options import MeshOptions
 from gmsh_crossquad.source.formula import Singularities
 from gmsh_crossquad.source.function import Function
 from gmsh_crossquad.source.per_face import PerFace
-from gmsh_crossquad.stages import block_mesh, face_fields
+from gmsh_crossquad.stages import block_mesh
 
 
 @pytest.fixture(autouse=True)

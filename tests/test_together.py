@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import gmsh_crossquad as cq
-from gmsh_crossquad import stages
+from gmsh_crossquad import faces_stage, stages
 from gmsh_crossquad.errors import LayoutError
 from gmsh_crossquad.field.pipeline import aligned_field
 from gmsh_crossquad.field.repair import with_pairs
@@ -109,7 +109,7 @@ def notch():
 def notch_faces():
     options = MeshOptions(size=0.15)
     model = stages.read_model(options)
-    return model, stages._faces(model, options, stages.wishes(model, options), "keep", Watch(), [])
+    return model, faces_stage.faces_of_model(model, options, faces_stage.wishes(model, options), "keep", Watch(), [])
 
 
 def test_the_faces_of_a_notch_have_divisions_alone_only(notch):
@@ -154,9 +154,9 @@ def test_other_sizes_of_blocks_are_not_tried_in_vain(notch, monkeypatch):
         tried.append(attempt)
         return before(model, faces, options, attempt, *rest)
 
-    before = stages._mesh
-    monkeypatch.setattr(stages, "divisible_together", hopeless)
-    monkeypatch.setattr(stages, "_mesh", mesh)
+    before = stages.lay_out
+    monkeypatch.setattr(faces_stage, "divisible_together", hopeless)
+    monkeypatch.setattr(stages, "lay_out", mesh)
     with pytest.raises(LayoutError, match="no divisions"):
         stages.block_mesh(MeshOptions(size=0.15))
     keys = [(a.background, a.rule) for a in tried]
@@ -175,8 +175,8 @@ def test_singularities_on_a_torus_get_a_pair():
         gmsh.model.occ.addTorus(0, 0, 0, 1, 0.4)
         gmsh.model.occ.synchronize()
         model = stages.read_model(options)
-        wanted = stages.wishes(model, options)
-        given, found = (stages._faces(model, options, wanted, rule, Watch(), []) for rule in ("keep", "divisible"))
+        wanted = faces_stage.wishes(model, options)
+        given, found = (faces_stage.faces_of_model(model, options, wanted, rule, Watch(), []) for rule in ("keep", "divisible"))
     finally:
         gmsh.finalize()
     assert not has_divisions(model, given.meshes[0], given.tmeshes[0])
