@@ -18,12 +18,12 @@ from ..records import Float, TMesh
 
 __all__ = ["alignment"]
 
-STRIP = 4.0
+STRIP = 2.5
 PRICE = 0.3
 MOST = 40
 MOST_ARCS = 2_000  # beyond, the rows, which are no flow rows, make the program much harder: 66 s were seen
 LEAST = 1.0
-UNLIKE = 1.5
+UNLIKE = 4.0
 
 
 def alignment(tmesh: TMesh, target: Float) -> tuple[sp.csr_array, Float, Float]:

@@ -28,7 +28,7 @@ BATCH = 40
 GAP = 0.02
 NODES = 200
 HEURISTICS = 0.05
-MOST_COLUMNS = 4_000
+MOST_COLUMNS = 2_500
 
 
 @dataclass(frozen=True)
