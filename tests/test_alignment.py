@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gmsh_crossquad.layout.alignment import LEAST, MOST, PRICE, STRIP, alignment
+from gmsh_crossquad.layout.alignment import LEAST, MOST, PRICE, STRIP, UNLIKE, alignment
 from gmsh_crossquad.records import TMesh
 from tests.tmeshes import l_shape
 
@@ -54,7 +54,7 @@ def test_the_free_shift_is_one_width():
     assert free == pytest.approx(0.5 / (6.0 / 24.0))
 
 
-@pytest.mark.parametrize("width", [6.0 / STRIP * 1.01, 2.0, 6.0])
+@pytest.mark.parametrize("width", [6.0 / STRIP * 1.01, 6.0 / STRIP + 1.0, 6.0])
 def test_wide_patches_are_left_alone(width):
     rows, free, _ = alignment(strip([3.0, 3.0], [2.0, 4.0], width), np.ones(6))
     assert rows.shape == (0, 6)
@@ -62,7 +62,8 @@ def test_wide_patches_are_left_alone(width):
 
 
 def test_sides_of_unlike_length_and_bare_sides_are_left_alone():
-    assert len(alignment(strip([6.0, 6.0], [2.0, 4.0], 0.1), np.ones(6))[1]) == 0
+    assert len(alignment(strip([UNLIKE * 3.1, UNLIKE * 3.1], [2.0, 4.0], 0.1), np.ones(6))[1]) == 0
+    assert len(alignment(strip([UNLIKE * 2.9, UNLIKE * 2.9], [2.0, 4.0], 0.1), np.ones(6))[1]) == 2
     assert len(alignment(strip([6.0], [6.0], 0.1), np.ones(4))[1]) == 0
 
 
