@@ -31,6 +31,7 @@ ROUNDS = 3
 FEW = 4
 GROWTH = 3
 WORTH_REFINING = 0.02
+SMALL = 1_000  # cells up to which any grid is refined: so few may be too few for two singularities that are close
 MOST_QUADS, QUADS_PER_FACE = 25_000, 100
 DOUBLINGS = 3  # of the final edges on curves that turn too much
 LARGE, HUGE = 6_000, 10_000  # cells of a shell from which it is refined for folded cells only, and not at all
@@ -125,7 +126,7 @@ def smooth_guide(
         chords = find_chords(tmesh, quotient(tmesh, coarse))
     notes: list[str] = []
     finer: Int | None = None
-    best: tuple[tuple[int, int, float], Guide, Int] | None = None
+    best: tuple[tuple[int, int, int, float], Guide, Int] | None = None
     first = 0
     for round_ in range(2 * ROUNDS):
         with watch.stage("guide"):
@@ -133,7 +134,7 @@ def smooth_guide(
             q = quotient(tmesh, arc_divisions(chords, divisions.guide))
             first = first or len(q.quads)
             most = max(MOST_QUADS, QUADS_PER_FACE * len(model.faces))
-            if len(q.quads) > min(GROWTH * first, max(first, most)):
+            if len(q.quads) > max(SMALL, min(GROWTH * first, max(first, most))):
                 break
             if best is not None and len(q.quads) > (LARGE if not best[0][0] else HUGE) and surfaces.curved.any():
                 break
@@ -159,14 +160,14 @@ def smooth_guide(
                 steep = steep_chords(model, surfaces, guide, fine)
                 if not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any()):
                     fine, steep = _divided(model, surfaces, guide, fine, steep, evaluate, vertices)
-        score = (-len(folded), -len(steep), report.min_scaled_jacobian)
+        score = (-len(folded), -len(steep), -len(bad), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
         elif len(report.inverted) > -best[0][0]:
             break
         if round_ + 1 >= ROUNDS and (len(bad) > FEW or not len(folded)):
             break
-        if not (len(bad) or len(steep)) or report.min_scaled_jacobian < WORTH_REFINING:
+        if not (len(bad) or len(steep)) or (report.min_scaled_jacobian < WORTH_REFINING and len(q.quads) > SMALL):
             break
         if round_ + 1 < 2 * ROUNDS:
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
@@ -174,7 +175,7 @@ def smooth_guide(
         finer = divisions.guide.copy()
         finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, surfaces, guide, bad), steep)])] *= 2
     assert best is not None
-    (folds, _, quality), guide, fine = best
+    (folds, _, _, quality), guide, fine = best
     if folds:
         raise MeshError(
             f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",

@@ -6,9 +6,8 @@ would be sheared by the angle atan(d / w) for a shift d and the width w.  For a 
 into it, the other side has N' = sum of the arcs before f + the same fraction of the arc that holds f.  The shift is
 d = (N_k - N') H with H the mean edge there, and the cost is PRICE (d / w - 1) where d > w: one row and two slack columns.
 Measured on a motor with an air gap of 1/130 of its length: the greatest shift falls from 31 to 4 widths, and the least scaled
-Jacobian of the guide grid rises from .002 to .34.  The two
-circles of a ring are sides of unlike length, and a ring turned by half a turn cannot be laid out either: a crankshaft with
-such rings has 14 inverted cells where they are left out, none with them.
+Jacobian of the guide grid rises from .002 to .34.  The two circles of a ring are sides of unlike length, and a ring turned by
+half a turn cannot be laid out either: a crankshaft with such rings has 14 inverted cells where they are left out, else none.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from ..records import Float, TMesh
 
 __all__ = ["alignment"]
 
-STRIP = 2.5
+STRIP = 4.0
 PRICE = 0.3
 MOST = 40
 MOST_ARCS = 2_000  # beyond, the rows, which are no flow rows, make the program much harder: 66 s were seen
