@@ -258,5 +258,10 @@ def test_physical_curves_on_no_face_get_edges(session: None) -> None:
         assert exact * (1 - 0.12**2 / 20) <= length.sum() <= exact * (1 + 1e-12)
         inner = np.unique(nodes[0])
         assert len(inner) == len(numbers[0]) + (tag == wire)
-    all_nodes = gmsh.model.mesh.getNodes()[1].reshape(-1, 3)
-    assert np.sum(np.linalg.norm(all_nodes - [1, 1, 0], axis=1) < 1e-9) == 1  # the square's corner is the wire's end
+    for order in (1, 2):
+        mesh(size=0.1, order=order)
+        tags, all_nodes, _ = gmsh.model.mesh.getNodes()
+        assert len(np.unique(tags)) == len(tags)
+        assert (
+            np.sum(np.linalg.norm(all_nodes.reshape(-1, 3) - [1, 1, 0], axis=1) < 1e-9) == 1
+        )  # the square's corner is the wire's end

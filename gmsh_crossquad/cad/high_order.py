@@ -47,6 +47,8 @@ def element_order(order: int | None, incomplete: bool | None) -> tuple[int, bool
 def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, *, incomplete: bool = False) -> tuple[str, ...]:
     """Make the elements of the current Gmsh model those of a higher order, with all nodes on the CAD.
 
+    Curves on no face keep their edges of order 1.
+
     Parameters
     ----------
     model : Model
@@ -79,8 +81,9 @@ def raise_order(model: Model, surfaces: Surfaces, mesh: QuadMesh, order: int, *,
     used = np.ones(n + len(new.points), bool)
     used[new.quads[:, kept:]] = False
     with gmsh_errors("raising the order"):
-        # isolated points have numbers after those of the mesh (Gmsh's greatest number may be that of a mesh of before)
-        shift = sum(int(np.sum(gmsh.model.mesh.getNodes(*point)[0] > n)) for point in gmsh.model.getEntities(0))
+        # points and curves on no face are numbered after the mesh (Gmsh's greatest number may be that of a mesh of before)
+        lower = [*gmsh.model.getEntities(0), *gmsh.model.getEntities(1)]
+        shift = sum(int(np.sum(gmsh.model.mesh.getNodes(*entity)[0] > n)) for entity in lower)
         tags = np.cumsum(used)
         tags[n:] += shift
         for curve, nodes, parameters, lines in zip(model.curves, new.curve_nodes, new.curve_parameters, new.lines, strict=True):

@@ -120,10 +120,13 @@ def put_mesh(model: Model, mesh: QuadMesh, parameters: Sequence[Float | None] | 
             element += _put_elements(abs(tag), QUAD, quads, element) if len(quads) else 0
         if loose := loose_curves(model):
             numbers = {tag: node + 1 for tag, node in zip(model.vertex_tags.tolist(), mesh.vertex_node.tolist()) if node >= 0}
+            numbers.update(zip(alone, range(len(mesh.points) + 1, len(mesh.points) + len(alone) + 1)))
             sides = mesh.points[mesh.quads] - mesh.points[np.roll(mesh.quads, 1, axis=1)]
             size = float(np.median(np.linalg.norm(sides, axis=-1)))
+            number = len(mesh.points) + len(alone) + 1
             for tag in loose:
-                element += _put_loose_curve(tag, size, numbers, element)
+                added, elements = _put_loose_curve(tag, size, numbers, number, element)
+                number, element = number + added, element + elements
 
 
 def on_faces(
@@ -167,26 +170,27 @@ def on_faces(
             yield signed, np.flatnonzero(mesh.quad_tag == signed), nodes[node_tags[row] == part.tag]
 
 
-def _put_loose_curve(tag: int, size: float, numbers: dict[int, int], element: int) -> int:
-    """Nodes and elements of a curve on no face; ends that have a node in `numbers` keep it, the others are added there.
+def _put_loose_curve(tag: int, size: float, nodes: dict[int, int], number: int, element: int) -> tuple[int, int]:
+    """Nodes, numbered from `number`, and elements of a curve on no face; its ends keep the node that they have in `nodes`.
 
-    Returns the number of elements.
+    Returns the numbers of nodes and of elements.
     """
     places, points = curve_places(tag, size)
     ends = [abs(end) for _, end in gmsh.model.getBoundary([(1, tag)], combined=False)]
-    made = 0
-    for end, point in zip(ends, (points[0], points[-1])):
-        if end not in numbers:
-            numbers[end] = int(gmsh.model.mesh.getMaxNodeTag()) + 1
-            made += _put_point(end, numbers[end], point, element + made)
-    first = int(gmsh.model.mesh.getMaxNodeTag()) + 1
-    inner = np.arange(first, first + len(places) - 2)
-    if not ends:  # closed, without a vertex
+    if not ends:
         raise MeshError("the curve has no end point", entity=(1, tag), remedy="give it one, or take it out of its Physical Curve")
+    first, made = number, 0
+    for end, point in zip(ends, (points[0], points[-1])):
+        if end not in nodes:
+            nodes[end] = number
+            number += 1
+            made += _put_point(end, nodes[end], point, element + made)
+    inner = np.arange(number, number + len(places) - 2)
     if len(inner):
         gmsh.model.mesh.addNodes(1, tag, inner.astype(np.uint64), points[1:-1].ravel(), places[1:-1])
-    chain = np.array([numbers[ends[0]], *inner.tolist(), numbers[ends[-1]]]) - 1
-    return made + _put_elements(tag, LINE, np.stack([chain[:-1], chain[1:]], axis=1), element + made)
+    chain = np.array([nodes[ends[0]], *inner.tolist(), nodes[ends[-1]]]) - 1
+    made += _put_elements(tag, LINE, np.stack([chain[:-1], chain[1:]], axis=1), element + made)
+    return number + len(inner) - first, made
 
 
 def _put_point(tag: int, node: int, point: Float, element: int) -> int:
