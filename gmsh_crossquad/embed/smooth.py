@@ -73,6 +73,8 @@ HOPELESS_ROUNDS, HOPELESS = 5, 0.1
 """On curved faces a start is given up if after so many rounds more than this share of the quads is still turned over."""
 FEW_ROUNDS = 4
 """Greatest number of untangling rounds where another start has led to a valid grid."""
+MOST_STARTED = 25_000
+"""Quads of all starts together beyond which no other start is made: each takes 30 seconds for 20,000 quads of a shell."""
 DOUBTFUL = 0.05
 """Least scaled Jacobian up to which another start is tried."""
 TRUSTED = 0.15
@@ -159,6 +161,8 @@ def smooth(guide: Guide, model: Model, surfaces: Surfaces) -> tuple[Guide, Smoot
     best, quality, chosen, rounds = given, -np.inf, order[0], 0
     starts = 0
     for name in order:
+        if starts and (starts + 1) * len(guide.quads) > MOST_STARTED:
+            break
         starts += 1
         start = laplace_start(given, *ground) if name == "laplace" else given
         own, sides = (placed, placed.sides) if name == "placed" else (rest, rest.even)
