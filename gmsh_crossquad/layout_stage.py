@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -96,6 +96,16 @@ def lay_out(
         mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
         if isinstance(surfaces, JoinedSurfaces):
             mesh = surfaces.owned(mesh)
+        moved = [model.curves[c].tag for c, faces in enumerate(evaluate.faces) if faces]
+        if moved:
+            note = f"nodes of {len(moved)} curves that are off their faces were moved to these (curve {moved[0]} and others)"
+            mesh = replace(
+                mesh,
+                notes=(
+                    *mesh.notes,
+                    note if len(moved) > 1 else f"nodes of curve {moved[0]}, which is off its faces, were moved to these",
+                ),
+            )
     return Laid(tmesh, coarse, result, mesh)
 
 

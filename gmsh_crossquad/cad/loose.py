@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import gmsh
 import numpy as np
 
+from ..errors import MeshError
 from ..records import Float, Model
 
-__all__ = ["curve_places", "loose_curves", "loose_points"]
+__all__ = ["evenly_spaced", "loose_curves", "loose_points"]
 
 SAMPLES = 400
 MOST_EDGES = 10_000
@@ -35,7 +36,7 @@ def _grouped(dim: int) -> Iterator[int]:
     yield from seen
 
 
-def curve_places(tag: int, size: float) -> tuple[Float, Float]:
+def evenly_spaced(tag: int, size: float) -> tuple[Float, Float]:
     """Parameters (n,) and points (n, 3) of a curve's nodes, evenly spaced by arc length, its ends included.
 
     Parameters
@@ -44,12 +45,20 @@ def curve_places(tag: int, size: float) -> tuple[Float, Float]:
         Of a curve of the current Gmsh model.
     size : float
         Greatest edge length, in the user's units.
+
+    Raises
+    ------
+    MeshError
+        The curve would have more than `MOST_EDGES` edges.
     """
     low, high = (float(x[0]) for x in gmsh.model.getParametrizationBounds(1, tag))
     t = np.linspace(low, high, SAMPLES + 1)
     points = np.asarray(gmsh.model.getValue(1, tag, t)).reshape(-1, 3)
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    n = int(min(max(np.ceil(s[-1] / size * (1 - 1e-9)), 1), MOST_EDGES))
+    n = max(int(np.ceil(s[-1] / size * (1 - 1e-9))), 1)
+    if n > MOST_EDGES:
+        remedy = "take it out of its Physical Curve, or give a greater size"
+        raise MeshError(f"the curve, which is on no face, would have {n} edges", entity=(1, tag), remedy=remedy)
     inner = np.interp(np.linspace(0.0, s[-1], n + 1)[1:-1], s, t)
     parameters = np.concatenate([[low], inner, [high]])
     return parameters, np.asarray(gmsh.model.getValue(1, tag, parameters)).reshape(-1, 3)

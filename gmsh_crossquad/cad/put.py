@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import MeshError
 from ..records import Float, Int, Model, QuadMesh
-from .loose import curve_places, loose_curves, loose_points
+from .loose import evenly_spaced, loose_curves, loose_points
 from .periodic import unlink
 from .session import gmsh_errors
 
@@ -175,7 +175,7 @@ def _put_loose_curve(tag: int, size: float, nodes: dict[int, int], number: int, 
 
     Returns the numbers of nodes and of elements.
     """
-    places, points = curve_places(tag, size)
+    places, points = evenly_spaced(tag, size)
     ends = [abs(end) for _, end in gmsh.model.getBoundary([(1, tag)], combined=False)]
     if not ends:
         raise MeshError("the curve has no end point", entity=(1, tag), remedy="give it one, or take it out of its Physical Curve")
