@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,15 +11,14 @@ from .embed.place import place
 from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
 from .fill.curve_edges import chords_to_divide, graded, steep_chords
+from .fill.filler import Filler
 from .fill.numbering import guide_chords
-from .fill.pipeline import poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.quantize import Indivisible, quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
-from .surfaces import Surfaces
 from .watch import Watch
 
 __all__ = ["GuideResult", "TooManyCells", "coarse_divisions", "smooth_guide"]
@@ -35,7 +33,6 @@ SMALL = 1_000  # cells up to which any grid is refined: so few may be too few fo
 MOST_QUADS, QUADS_PER_FACE = 25_000, 100
 DOUBLINGS = 3  # of the final edges on curves that turn too much
 LARGE, HUGE = 6_000, 10_000  # cells of a shell from which it is refined for folded cells only, and not at all
-Evaluate = Callable[[int, Float], Float]
 
 
 class TooManyCells(LayoutError):
@@ -94,14 +91,11 @@ def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
 
 
 def smooth_guide(
-    model: Model,
-    surfaces: Surfaces,
     tmesh: TMesh,
     coarse: Int,
     size: Float,
     guide_size: Float,
-    evaluate: Evaluate,
-    vertices: Float,
+    filler: Filler,
     watch: Watch,
     capped: bool = True,
 ) -> GuideResult:
@@ -112,8 +106,8 @@ def smooth_guide(
     coarse : (a,) int64
     size : (a,) float64, scaled
     guide_size : (a,) float64, scaled
-    evaluate, vertices
-        As for `fill.pipeline.fill`.
+    filler : Filler
+        Of the model.
     watch : Watch
     capped : bool
         As for `layout.divisions.chord_divisions`.
@@ -122,6 +116,7 @@ def smooth_guide(
     ------
     LayoutError, MeshError
     """
+    model, surfaces = filler.model, filler.surfaces
     with watch.stage("guide"):
         chords = find_chords(tmesh, quotient(tmesh, coarse))
     notes: list[str] = []
@@ -156,10 +151,10 @@ def smooth_guide(
         steep = np.zeros(0, np.int64)
         if not len(bad):
             with watch.stage("fill"):
-                bad, folded = poor_cells(model, surfaces, guide, fine, evaluate, vertices)
+                bad, folded = filler.poor_cells(guide, fine)
                 steep = steep_chords(model, surfaces, guide, fine)
                 if not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any()):
-                    fine, steep = _divided(model, surfaces, guide, fine, steep, evaluate, vertices)
+                    fine, steep = _divided(filler, guide, fine, steep)
         score = (-len(folded), -len(steep), -len(bad), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
@@ -183,24 +178,22 @@ def smooth_guide(
         )
     with watch.stage("fill"):
         halved = graded(model, guide, fine)
-        if (halved != fine).any() and not len(poor_cells(model, surfaces, guide, halved, evaluate, vertices)[1]):
+        if (halved != fine).any() and not len(filler.poor_cells(guide, halved)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))
 
 
-def _divided(
-    model: Model, surfaces: Surfaces, guide: Guide, fine: Int, steep: Int, evaluate: Evaluate, vertices: Float
-) -> tuple[Int, Int]:
+def _divided(filler: Filler, guide: Guide, fine: Int, steep: Int) -> tuple[Int, Int]:
     """Final edges per guide edge, doubled on steep chords as often as it helps, and the chords that stay steep."""
     for _ in range(DOUBLINGS):
         if not len(steep):
             break
         more = fine.copy()
         more[steep] *= 2
-        if len(poor_cells(model, surfaces, guide, more, evaluate, vertices)[1]):
+        if len(filler.poor_cells(guide, more)[1]):
             break
-        fine, steep = more, steep_chords(model, surfaces, guide, more)
+        fine, steep = more, steep_chords(filler.model, filler.surfaces, guide, more)
     return fine, steep
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gmsh_crossquad.embed.quality import scaled_jacobian
 from gmsh_crossquad.errors import InputError, MeshError
-from gmsh_crossquad.fill import work
+from gmsh_crossquad.fill import placed
 from gmsh_crossquad.fill.coons import coons, grid_quads, grid_quality
 from gmsh_crossquad.fill.curves import curve_parameters, monotone_cubic
 from gmsh_crossquad.fill.numbering import guide_chords, guide_topology
@@ -468,7 +468,7 @@ def test_cells_beside_bulging_edges_do_not_fold(monkeypatch: pytest.MonkeyPatch)
     mesh = fill(model, Planes(model), guide, uniform(guide, 8), straight(model))
     quality = scaled_jacobian(mesh.points, mesh.quads, UP)
     assert quality.min() > 0
-    monkeypatch.setattr(work, "SHARES", ())
+    monkeypatch.setattr(placed, "SHARES", ())
     with pytest.raises(MeshError, match="fold"):
         fill(model, Planes(model), guide, uniform(guide, 8), straight(model))
 
@@ -482,7 +482,7 @@ def test_sides_of_a_thin_cell_do_not_shear_it(monkeypatch: pytest.MonkeyPatch) -
     guide = make_guide(model, xy, quads, [(0, 1), (1, 2), (2, 8, 3), (3, 5, 4), (4, 6, 0)])
     mesh = fill(model, Planes(model), guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() > 0.5
-    monkeypatch.setattr(work, "SHARES", ())
+    monkeypatch.setattr(placed, "SHARES", ())
     mesh = fill(model, Planes(model), guide, uniform(guide, 16), straight(model))
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() < 0.3
 
@@ -530,11 +530,11 @@ def test_cells_that_straightening_would_fold_keep_their_edges(monkeypatch: pytes
     """Cubics follow thin rings of eight cells, straight edges would cross the inner circle."""
     model, guide, evaluate = ring(8, 20)
     straight_lines = lambda skeleton, topology, *_: (0.0, *np.zeros((2, len(topology.edges)), bool))  # noqa: E731
-    monkeypatch.setattr(work, "bundle_offsets", straight_lines)
-    monkeypatch.setattr(work.Work, "wanted", lambda self, own: np.ones(len(own)))
+    monkeypatch.setattr(placed, "bundle_offsets", straight_lines)
+    monkeypatch.setattr(placed.Placed, "wanted", lambda self, own: np.ones(len(own)))
     mesh = fill(model, Planes(model), guide, uniform(guide, 4), evaluate)
     assert scaled_jacobian(mesh.points, mesh.quads, UP).min() > 0
-    monkeypatch.setattr(work.Work, "_restored", lambda self, worst, *_: worst)
+    monkeypatch.setattr(placed.Placed, "_restored", lambda self, worst, *_: worst)
     with pytest.raises(MeshError, match="fold"):
         fill(model, Planes(model), guide, uniform(guide, 4), evaluate)
 

@@ -1,7 +1,7 @@
 """The final mesh from the smoothed guide grid.
 
 Curves first (exact CAD points, monotone spacing), then the inner guide edges (Hermite cubics), then all cells (Coons); what is
-done where cells come out badly, `work` says.
+done where cells come out badly, `placed` says.
 
 On a curved face what cubics and Coons' rule give is put on the surface: the nodes inside guide edges first, those inside cells,
 which lie between them, afterwards.
@@ -18,9 +18,9 @@ from ..records import Float, Guide, Int, Model, QuadMesh
 from ..surfaces import Surfaces
 from .cells import Cells
 from .numbering import guide_chords
-from .work import Work
+from .placed import Placed
 
-__all__ = ["fill", "poor_cells"]
+__all__ = ["Placed", "fill", "mesh_of", "placed", "poor_cells", "poor_of", "shown_divisions"]
 
 SHOWN = 8  # divisions that show what any greater number would
 
@@ -69,10 +69,14 @@ def fill(
         raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
     if filler == "gmsh" and surfaces.curved.any():
         raise InputError("Gmsh's filler cannot fill curved faces", remedy='use "numpy"')
-    work = Work.start(model, surfaces, guide, divisions, evaluate, vertices)
-    cells, points = work.cells, work.points
-    own = cells.corner_quality()
-    _refuse_folds(model, guide, own, work.place(own))
+    return mesh_of(placed(model, surfaces, guide, divisions, evaluate, vertices), filler)
+
+
+def mesh_of(work: Placed, filler: str = "numpy") -> QuadMesh:
+    """The mesh of placed nodes; see `fill`."""
+    model, cells, points, own = work.model, work.cells, work.points, work.own
+    guide = cells.guide
+    _refuse_folds(model, guide, own, work.worst)
     if filler == "gmsh":
         from .gmsh_fill import gmsh_cells
 
@@ -106,7 +110,19 @@ def poor_cells(
     folded : (l,) int64
         Those of them that have an inverted fine quad.
     """
+    return poor_of(placed(model, surfaces, guide, shown_divisions(model, guide, divisions), evaluate, vertices))
+
+
+def poor_of(work: Placed) -> tuple[Int, Int]:
+    """The poor and the folded ones of placed cells; see `poor_cells`."""
+    return np.flatnonzero(work.worst < work.wanted(work.own)), np.flatnonzero(work.worst <= 0)
+
+
+def shown_divisions(model: Model, guide: Guide, divisions: Int) -> Int:
+    """The divisions (c,) of guide chords at which `poor_cells` judges."""
     shown = np.clip(divisions, 2, SHOWN)
+    if all(curve.spacing is None for curve in model.curves):
+        return shown
     edges, _, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     for curve, chain in zip(model.curves, guide.chains):
@@ -114,10 +130,21 @@ def poor_cells(
             along = np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:])
             own_chords = chord[np.searchsorted(edges[:, 0] * n + edges[:, 1], along)]
             shown[own_chords] = divisions[own_chords]
-    work = Work.start(model, surfaces, guide, shown, evaluate, vertices)
-    own = work.cells.corner_quality()
-    quality = work.place(own)
-    return np.flatnonzero(quality < work.wanted(own)), np.flatnonzero(quality <= 0)
+    return shown
+
+
+def placed(
+    model: Model,
+    surfaces: Surfaces,
+    guide: Guide,
+    divisions: Int,
+    evaluate: Callable[[int, Float], Float],
+    vertices: Float | None = None,
+) -> Placed:
+    """All nodes of the mesh in their places; arguments as for `fill`."""
+    work = Placed.start(model, surfaces, guide, divisions, evaluate, vertices)
+    work.worst[:] = work.place(work.own)
+    return work
 
 
 def _refuse_folds(model: Model, guide: Guide, own: Float, worst: Float) -> None:

@@ -10,7 +10,7 @@ back, if that leaves fewer folded ones.  Only cells that touch a changed edge ar
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from .numbering import guide_chords, guide_topology, number
 from .skeleton import Frames, Skeleton
 from .tangents import continuation, end_tangents
 
-__all__ = ["Work"]
+__all__ = ["Placed"]
 
 # rounds of straightening: what each takes off the bulge and the unevenness; all of it where cells are still folded
 SHARES = (0.5,) * 6 + (1.0,) * 4
@@ -56,14 +56,29 @@ class _Shape:
 
 
 @dataclass(frozen=True)
-class Work:
-    """A mesh in the making; `points`, `parameters` and the positions in `cells.skeleton` are filled in place."""
+class Placed:
+    """A mesh in the making; all arrays but `own`, and the positions in `cells.skeleton`, are filled in place.
+
+    Attributes
+    ----------
+    model : Model
+    cells : Cells
+    evaluate : callable
+    points : (n, 3) float64
+        Nodes, in the user's coordinates.
+    parameters : list of (k,) float64
+        Of the nodes of every curve.
+    own, worst : (q,) float64
+        Scaled Jacobian of every guide quad, and the least one of its fine quads.
+    """
 
     model: Model
     cells: Cells
     evaluate: Callable[[int, Float], Float]
     points: Float
     parameters: list[Float]
+    own: Float
+    worst: Float
 
     @classmethod
     def start(
@@ -74,7 +89,7 @@ class Work:
         divisions: Int,
         evaluate: Callable[[int, Float], Float],
         vertices: Float | None,
-    ) -> Work:
+    ) -> Placed:
         """Number all nodes and place those on CAD vertices."""
         edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
         if len(divisions) != n_chords:
@@ -89,10 +104,11 @@ class Work:
         skeleton = Skeleton.start(guide, pieces)
         skeleton.put_vertices(guide, topology, surfaces)
         cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces, cusp_corners(guide, model))
-        work = cls(model, cells, evaluate, points, [np.empty(0)] * len(guide.chains))
+        parameters = [np.empty(0)] * len(guide.chains)
+        work = cls(model, cells, evaluate, points, parameters, np.empty(0), np.empty(len(guide.quads)))
         for row in range(len(guide.chains)):
             work.put_curve(row, np.zeros(len(edges)))
-        return work
+        return replace(work, own=cells.corner_quality())
 
     def put_curve(self, row: int, even: Float) -> None:
         """Place the nodes of a CAD curve; `even` (e,) as in `curve_parameters`, per guide edge."""
