@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,15 +12,14 @@ from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
 from .fill.area_loss import followed
 from .fill.curve_edges import chords_to_divide, graded
+from .fill.filler import Filler
 from .fill.numbering import guide_chords
-from .fill.pipeline import poor_cells
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.quantize import Indivisible, quantize
 from .layout.quotient import Quotient, arc_points, quotient
 from .layout.verify import problems
 from .records import Float, Guide, Int, Model, TMesh
-from .surfaces import Surfaces
 from .watch import Watch
 
 __all__ = ["GuideResult", "TooManyCells", "coarse_divisions", "smooth_guide"]
@@ -35,7 +33,6 @@ WORTH_REFINING = 0.02
 SMALL = 1_000  # cells up to which any grid is refined: so few may be too few for two singularities that are close
 MOST_QUADS, QUADS_PER_FACE = 25_000, 100
 LARGE, HUGE = 6_000, 10_000  # cells of a shell from which it is refined for folded cells only, and not at all
-Evaluate = Callable[[int, Float], Float]
 
 
 class TooManyCells(LayoutError):
@@ -94,14 +91,11 @@ def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
 
 
 def smooth_guide(
-    model: Model,
-    surfaces: Surfaces,
     tmesh: TMesh,
     coarse: Int,
     size: Float,
     guide_size: Float,
-    evaluate: Evaluate,
-    vertices: Float,
+    filler: Filler,
     watch: Watch,
     capped: bool = True,
 ) -> GuideResult:
@@ -112,8 +106,8 @@ def smooth_guide(
     coarse : (a,) int64
     size : (a,) float64, scaled
     guide_size : (a,) float64, scaled
-    evaluate, vertices
-        As for `fill.pipeline.fill`.
+    filler : Filler
+        Of the model.
     watch : Watch
     capped : bool
         As for `layout.divisions.chord_divisions`.
@@ -122,6 +116,7 @@ def smooth_guide(
     ------
     LayoutError, MeshError
     """
+    model, surfaces = filler.model, filler.surfaces
     with watch.stage("guide"):
         chords = find_chords(tmesh, quotient(tmesh, coarse))
     notes: list[str] = []
@@ -156,11 +151,11 @@ def smooth_guide(
         steep = np.zeros(0, np.int64)
         if not len(bad):
             with watch.stage("fill"):
-                bad, folded = poor_cells(model, surfaces, guide, fine, evaluate, vertices)
+                bad, folded = filler.poor_cells(guide, fine)
                 more = followed(model, surfaces, guide, fine)
                 steep = np.flatnonzero(more != fine)
                 only_fine = not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any())
-                if len(steep) and only_fine and not len(poor_cells(model, surfaces, guide, more, evaluate, vertices)[1]):
+                if len(steep) and only_fine and not len(filler.poor_cells(guide, more)[1]):
                     fine, steep = more, steep[:0]
         score = (-len(folded), -len(steep), -len(bad), report.min_scaled_jacobian)
         if best is None or score > best[0]:
@@ -185,7 +180,7 @@ def smooth_guide(
         )
     with watch.stage("fill"):
         halved = graded(model, guide, fine)
-        if (halved != fine).any() and not len(poor_cells(model, surfaces, guide, halved, evaluate, vertices)[1]):
+        if (halved != fine).any() and not len(filler.poor_cells(guide, halved)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))

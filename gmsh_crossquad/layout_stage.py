@@ -13,7 +13,7 @@ from .cad.put import vertex_points
 from .cad.sizes import target_sizes
 from .faces_stage import Faces
 from .field.surface_mesh import surface_of
-from .fill.pipeline import fill
+from .fill.filler import Filler
 from .guide import GuideResult, coarse_divisions, smooth_guide
 from .layout.arc_sizes import arc_sizes
 from .layout.glue import glue
@@ -90,10 +90,11 @@ def lay_out(
         coarse = coarse_divisions(model, tmesh, wanted)
         if _known((*which, "divisions", coarse.tobytes()), seen):
             return None
-    evaluate, vertices = CurvePlaces.find(model, surfaces), vertex_points(model)
-    result = smooth_guide(model, surfaces, tmesh, coarse, user_size, guide_size, evaluate, vertices, watch, attempt.capped)
+    evaluate = CurvePlaces.find(model, surfaces)
+    filler = Filler(model, surfaces, evaluate, vertex_points(model))
+    result = smooth_guide(tmesh, coarse, user_size, guide_size, filler, watch, attempt.capped)
     with watch.stage("fill"):
-        mesh = fill(model, surfaces, result.guide, result.fine, evaluate, vertices)
+        mesh = filler.fill(result.guide, result.fine)
         if isinstance(surfaces, JoinedSurfaces):
             mesh = surfaces.owned(mesh)
         moved = [model.curves[c].tag for c, faces in enumerate(evaluate.faces) if faces]

@@ -469,7 +469,7 @@ def test_cells_beside_bulging_edges_do_not_fold(monkeypatch: pytest.MonkeyPatch)
     quality = scaled_jacobian(mesh.points, mesh.quads, UP)
     assert quality.min() > 0
     monkeypatch.setattr(pipeline, "SHARES", ())
-    monkeypatch.setattr(pipeline._Work, "_bend", lambda work, worst, tangents: worst)
+    monkeypatch.setattr(pipeline.Placed, "_bend", lambda work, worst, tangents: worst)
     with pytest.raises(MeshError, match="fold"):
         fill(model, Planes(model), guide, uniform(guide, 8), straight(model))
 

@@ -21,7 +21,7 @@ from .session import gmsh_errors
 
 __all__ = ["chains", "curved_face", "merged_face", "seams"]
 
-GRID = 24
+GRID = 10
 
 
 def seams(bounds: dict[int, list[int]], curved: Sequence[int], needed: set[int]) -> set[int]:

@@ -12,7 +12,7 @@ which lie between them, afterwards.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from .numbering import guide_chords, guide_topology, number
 from .skeleton import Frames, Skeleton
 from .tangents import continuation, end_tangents
 
-__all__ = ["fill", "poor_cells"]
+__all__ = ["Placed", "fill", "mesh_of", "placed", "poor_cells", "poor_of", "shown_divisions"]
 
 # rounds of straightening: what each takes off the bulge and the unevenness; all of it where cells are still folded
 SHARES = (0.5,) * 6 + (1.0,) * 4
@@ -81,10 +81,14 @@ def fill(
         raise InputError(f"unknown filler {filler!r}", remedy='use "numpy" or "gmsh"')
     if filler == "gmsh" and surfaces.curved.any():
         raise InputError("Gmsh's filler cannot fill curved faces", remedy='use "numpy"')
-    work = _Work.start(model, surfaces, guide, divisions, evaluate, vertices)
-    cells, points = work.cells, work.points
-    own = cells.corner_quality()
-    _refuse_folds(model, guide, own, work.place(own))
+    return mesh_of(placed(model, surfaces, guide, divisions, evaluate, vertices), filler)
+
+
+def mesh_of(work: Placed, filler: str = "numpy") -> QuadMesh:
+    """The mesh of placed nodes; see `fill`."""
+    model, cells, points, own = work.model, work.cells, work.points, work.own
+    guide = cells.guide
+    _refuse_folds(model, guide, own, work.worst)
     if filler == "gmsh":
         from .gmsh_fill import gmsh_cells
 
@@ -118,7 +122,19 @@ def poor_cells(
     folded : (l,) int64
         Those of them that have an inverted fine quad.
     """
+    return poor_of(placed(model, surfaces, guide, shown_divisions(model, guide, divisions), evaluate, vertices))
+
+
+def poor_of(work: Placed) -> tuple[Int, Int]:
+    """The poor and the folded ones of placed cells; see `poor_cells`."""
+    return np.flatnonzero(work.worst < work.wanted(work.own)), np.flatnonzero(work.worst <= 0)
+
+
+def shown_divisions(model: Model, guide: Guide, divisions: Int) -> Int:
+    """The divisions (c,) of guide chords at which `poor_cells` judges."""
     shown = np.clip(divisions, 2, SHOWN)
+    if all(curve.spacing is None for curve in model.curves):
+        return shown
     edges, _, chord, _ = guide_chords(guide.quads)
     n = len(guide.points)
     for curve, chain in zip(model.curves, guide.chains):
@@ -126,21 +142,47 @@ def poor_cells(
             along = np.minimum(chain[:-1], chain[1:]) * n + np.maximum(chain[:-1], chain[1:])
             own_chords = chord[np.searchsorted(edges[:, 0] * n + edges[:, 1], along)]
             shown[own_chords] = divisions[own_chords]
-    work = _Work.start(model, surfaces, guide, shown, evaluate, vertices)
-    own = work.cells.corner_quality()
-    quality = work.place(own)
-    return np.flatnonzero(quality < work.wanted(own)), np.flatnonzero(quality <= 0)
+    return shown
+
+
+def placed(
+    model: Model,
+    surfaces: Surfaces,
+    guide: Guide,
+    divisions: Int,
+    evaluate: Callable[[int, Float], Float],
+    vertices: Float | None = None,
+) -> Placed:
+    """All nodes of the mesh in their places; arguments as for `fill`."""
+    work = Placed.start(model, surfaces, guide, divisions, evaluate, vertices)
+    work.worst[:] = work.place(work.own)
+    return work
 
 
 @dataclass(frozen=True)
-class _Work:
-    """A mesh in the making; `points`, `parameters` and the positions in `cells.skeleton` are filled in place."""
+class Placed:
+    """A mesh in the making; all arrays but `own`, and the positions in `cells.skeleton`, are filled in place.
+
+    Attributes
+    ----------
+    model : Model
+    cells : Cells
+    evaluate : callable
+    points : (n, 3) float64
+        Nodes, in the user's coordinates.
+    parameters : list of (k,) float64
+        Of the nodes of every curve.
+    own, worst : (q,) float64
+        Scaled Jacobian of every guide quad, and the least one of its fine quads.
+    """
 
     model: Model
     cells: Cells
     evaluate: Callable[[int, Float], Float]
     points: Float
     parameters: list[Float]
+    own: Float
+    worst: Float
 
     @classmethod
     def start(
@@ -151,7 +193,7 @@ class _Work:
         divisions: Int,
         evaluate: Callable[[int, Float], Float],
         vertices: Float | None,
-    ) -> _Work:
+    ) -> Placed:
         """Number all nodes and place those on CAD vertices."""
         edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
         if len(divisions) != n_chords:
@@ -166,10 +208,11 @@ class _Work:
         skeleton = Skeleton.start(guide, pieces)
         skeleton.put_vertices(guide, topology, surfaces)
         cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces, cusp_corners(guide, model))
-        work = cls(model, cells, evaluate, points, [np.empty(0)] * len(guide.chains))
+        parameters = [np.empty(0)] * len(guide.chains)
+        work = cls(model, cells, evaluate, points, parameters, np.empty(0), np.empty(len(guide.quads)))
         for row in range(len(guide.chains)):
             work.put_curve(row, np.zeros(len(edges)))
-        return work
+        return replace(work, own=cells.corner_quality())
 
     def put_curve(self, row: int, even: Float) -> None:
         """Place the nodes of a CAD curve; `even` (e,) as in `curve_parameters`, per guide edge."""
