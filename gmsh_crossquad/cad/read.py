@@ -7,21 +7,22 @@ same tolerances hold from nanometres to megametres.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import gmsh
 import numpy as np
 
 from ..errors import GeometryError
 from ..options import MeshOptions
 from ..records import Curve, Face, Float, Model
+from .collapsed import check_contacts, needed_vertices, without_joints, without_points
 from .curved_face import curved_face, merged_face, seams
 from .joints import Group, smooth_joints
 from .knots import untie
 from .loops import boundary_loops
 from .periodic import linked
+from .physical import group_names, physical_points
 from .plane import face_plane
-from .sample import refine, sample
+from .raw_curves import RawCurve, Vertices, degenerate, read_curve
+from .sample import refine
 from .session import gmsh_errors
 from .tangents import cad_tangents
 from .transfinite import transfinite_parameters
@@ -30,41 +31,6 @@ __all__ = ["read_model"]
 
 CONVEX = ("Line", "Circle", "Ellipse")  # cannot meet themselves
 NEARLY_FLAT = 1e-2  # height over extent of the boundary of a plane surface that is meshed as a curved one
-NO_EXTENT = 1e-9  # of the model: shorter curves are points
-COLLAPSED = 1e-6  # of the model: edges that the CAD itself calls a point; kernels draw them within the tolerance of the vertex
-
-
-@dataclass
-class _Raw:
-    """A curve in the user's coordinates."""
-
-    tag: int
-    kind: str
-    ends: list[int]
-    parameters: Float
-    points: Float
-    untied: bool = False
-
-
-@dataclass
-class _Vertices:
-    """Rows of the CAD vertices, in the order in which they are met."""
-
-    tags: list[int] = field(default_factory=list)
-    points: list[Float] = field(default_factory=list)
-    row: dict[int, int] = field(default_factory=dict)
-
-    def cad(self, tag: int) -> int:
-        """Row of Gmsh point `tag`."""
-        if tag not in self.row:
-            self.row[tag] = self.made(np.array(gmsh.model.getValue(0, tag, [])), tag)
-        return self.row[tag]
-
-    def made(self, point: Float, tag: int = -1) -> int:
-        """Row of a new vertex."""
-        self.tags.append(tag)
-        self.points.append(point)
-        return len(self.tags) - 1
 
 
 def read_model(options: MeshOptions) -> Model:
@@ -96,8 +62,8 @@ def read_model(options: MeshOptions) -> Model:
             raise GeometryError("the surface has no boundary curve", entity=(2, f), remedy=remedy)
     inside = {f: [c for d, c in embedded[f] if d == 1 and c not in bounds[f]] for f in tags}
     curve_tags = list(dict.fromkeys(c for f in tags for c in bounds[f] + inside[f]))
-    vertices = _Vertices()
-    raw = [_read_curve(c, vertices) for c in curve_tags]
+    vertices = Vertices()
+    raw = [read_curve(c, vertices) for c in curve_tags]
     points = {f: [vertices.cad(p) for d, p in embedded[f] if d == 0] for f in tags}
     lo, hi = _box([r.points for r in raw])
     scale = float(np.linalg.norm(hi - lo))
@@ -105,21 +71,21 @@ def read_model(options: MeshOptions) -> Model:
         raise GeometryError("the surface has no extent", entity=(2, tags[0]), remedy="remove it")
     for r in raw:
         r.parameters, r.points = refine(r.tag, r.kind, r.parameters, r.points, scale)
-        if r.kind not in CONVEX and not _degenerate(r, scale):
+        if r.kind not in CONVEX and not degenerate(r, scale):
             tied = r.points
             r.parameters, r.points = untie(r.parameters, r.points, scale)
             r.untied = r.points is not tied
     lo, hi = _box([r.points for r in raw])
     origin, scale = 0.5 * (lo + hi), float(np.linalg.norm(hi - lo))
-    kept, twins = _without_points([r for r in raw if not _degenerate(r, scale)], vertices, points, scale)
+    kept, twins = without_points([r for r in raw if not degenerate(r, scale)], vertices, points, scale)
     planes = _planes(tags, signs, {r.tag: r.points for r in kept}, origin, scale)
     needed = {abs(int(c)) for d, t in gmsh.model.getPhysicalGroups(1) for c in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
     needed |= {c for f in tags for c in inside[f]}
     left = seams(bounds, [f for f in tags if planes[f] is None], needed)
     if left or len(kept) < len(raw):
         kept = [r for r in kept if r.tag not in left]
-        _check_contacts(vertices, raw, kept, bounds, points)
-        vertices, points = _needed_vertices(vertices, kept, points)
+        check_contacts(vertices, raw, kept, bounds, points)
+        vertices, points = needed_vertices(vertices, kept, points)
     spacing = transfinite_parameters(
         {r.tag: float(np.sqrt((np.diff(r.points, axis=0) ** 2).sum(1)).sum()) for r in kept},
         [r.tag for r in kept if r.ends[0] == r.ends[1]],
@@ -129,7 +95,7 @@ def read_model(options: MeshOptions) -> Model:
     if options.feature_angle is not None:
         ranges = {r.tag: (float(r.parameters[0]), float(r.parameters[-1])) for r in kept if r.tag not in spacing}
         groups = smooth_joints(signs, ranges, needed, np.radians(options.feature_angle), scale)
-        kept, vertices, points = _without_joints(groups, kept, vertices, points)
+        kept, vertices, points = without_joints(groups, kept, vertices, points)
     curves = tuple(_curve(r, origin, scale, spacing.get(r.tag)) for r in kept)
     row = {c.tag: i for i, c in enumerate(curves)}
     place = np.array(vertices.points).reshape(-1, 3)
@@ -148,8 +114,8 @@ def read_model(options: MeshOptions) -> Model:
             faces.append(curved_face(f, bound, embed, points[f], curves, row, scale))
         else:
             faces.append(_face(f, bound, embed, points[f], curves, row, place, plane))
-    groups_of = _group_names(2)
-    asked = _physical_points() | {vertices.tags[p] for f in tags for p in points[f]}
+    groups_of = group_names(2)
+    asked = physical_points() | {vertices.tags[p] for f in tags for p in points[f]}
     asked |= {kept_tag for tag, kept_tag in twins.items() if tag in asked}
     twin_rows = [(tag, vertices.tags.index(kept_tag)) for tag, kept_tag in sorted(twins.items()) if kept_tag in vertices.tags]
     return Model(
@@ -162,37 +128,14 @@ def read_model(options: MeshOptions) -> Model:
         curves=curves,
         faces=tuple(faces),
         notes=_notes(kept, groups, len(twin_rows)),
-        point_names=tuple((p, name) for p, names in _group_names(0).items() for name in names),
+        point_names=tuple((p, name) for p, names in group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
         ignored_curves=tuple(sorted(c for group in groups for c in group.ignored)),
         vertex_twins=tuple(twin_rows),
     )
 
 
-def _physical_points() -> set[int]:
-    """Tags of the points in physical groups."""
-    return {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
-
-
-def _without_joints(
-    groups: tuple[Group, ...], kept: list[_Raw], vertices: _Vertices, points: dict[int, list[int]]
-) -> tuple[list[_Raw], _Vertices, dict[int, list[int]]]:
-    """Curves, vertices and points inside faces without the joints of groups; points in physical groups on joints are inside."""
-    asked = _physical_points()
-    ends = {r.tag: r.ends for r in kept}
-    points = dict(points)
-    for group in groups:
-        inside = [v for f in group.tags for v in points[f]]
-        inside += [v for c in group.ignored for v in ends[c] if vertices.tags[v] in asked]
-        points[group.tags[0]] = list(dict.fromkeys(inside))
-    ignored = {c for group in groups for c in group.ignored}
-    if ignored:
-        kept = [r for r in kept if r.tag not in ignored]
-        vertices, points = _needed_vertices(vertices, kept, points)
-    return kept, vertices, points
-
-
-def _notes(kept: list[_Raw], groups: tuple[Group, ...], twins: int) -> tuple[str, ...]:
+def _notes(kept: list[RawCurve], groups: tuple[Group, ...], twins: int) -> tuple[str, ...]:
     """What the user should know about the model."""
     notes = [f"curve {r.tag} crosses itself; the tiny loop was cut off" for r in kept if r.untied]
     if twins:
@@ -203,16 +146,6 @@ def _notes(kept: list[_Raw], groups: tuple[Group, ...], twins: int) -> tuple[str
     if ignored:
         notes.append(f"{ignored} smooth curve{'s were' if ignored > 1 else ' was'} not followed")
     return tuple(notes)
-
-
-def _group_names(dim: int) -> dict[int, list[str]]:
-    """Names of the physical groups that hold each entity of a dimension."""
-    out: dict[int, list[str]] = {}
-    for _, group in gmsh.model.getPhysicalGroups(dim):
-        name = gmsh.model.getPhysicalName(dim, group)
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group) if name else ():
-            out.setdefault(abs(int(entity)), []).append(name)
-    return out
 
 
 def _wanted_faces() -> list[int]:
@@ -235,62 +168,7 @@ def _box(points: list[Float]) -> tuple[Float, Float]:
     return np.min([p.min(0) for p in points], 0), np.max([p.max(0) for p in points], 0)
 
 
-def _read_curve(tag: int, vertices: _Vertices) -> _Raw:
-    """First samples of a curve, between its CAD vertices."""
-    with gmsh_errors("reading", entity=(1, tag)):
-        kind = gmsh.model.getType(1, tag)
-        tags = [int(p) for _, p in gmsh.model.getBoundary([(1, tag)], combined=False, oriented=False)]
-        ends = [vertices.cad(p) for p in tags]
-    parameters, points = sample(tag, kind)
-    if not ends:
-        ends = [vertices.made(points[0])]
-    if len(ends) == 1:
-        ends = ends * 2
-    snap = np.array([vertices.points[p] for p in ends])
-    if ((points[[0, -1]] - snap[::-1]) ** 2).sum() < ((points[[0, -1]] - snap) ** 2).sum():
-        ends, snap = ends[::-1], snap[::-1]
-    points[[0, -1]] = snap
-    return _Raw(tag, kind, ends, parameters, points)
-
-
-def _degenerate(raw: _Raw, scale: float) -> bool:
-    """A closed curve without extent, as at a pole; Gmsh has no type for the edges that OpenCASCADE calls degenerate."""
-    limit = COLLAPSED if raw.kind == "Unknown" else NO_EXTENT
-    return raw.ends[0] == raw.ends[1] and bool(np.ptp(raw.points, axis=0).max() <= limit * scale)
-
-
-def _without_points(
-    raw: list[_Raw], vertices: _Vertices, points: dict[int, list[int]], scale: float
-) -> tuple[list[_Raw], dict[int, int]]:
-    """The curves but open ones without extent, whose two vertices become one; the rows of `points` are changed.
-
-    The first of the vertices stays, one in a physical group before others; the tags of the others are returned with its tag.
-    """
-    short = [r for r in raw if np.ptp(r.points, axis=0).max() <= NO_EXTENT * scale and r.ends[0] != r.ends[1]]
-    if not short:
-        return raw, {}
-    same: dict[int, int] = {}
-    asked = _physical_points()
-
-    def first(v: int) -> int:
-        while v in same:
-            v = same[v]
-        return v
-
-    for r in short:
-        ends = {first(v) for v in r.ends}
-        if len(ends) == 2:
-            stays, goes = sorted(ends, key=lambda v: (vertices.tags[v] not in asked, v))
-            same[goes] = stays
-    kept = [r for r in raw if not any(r is s for s in short)]
-    for r in kept:
-        r.ends = [first(v) for v in r.ends]
-    for rows in points.values():
-        rows[:] = [first(v) for v in rows]
-    return kept, {vertices.tags[v]: vertices.tags[first(v)] for v in same}
-
-
-def _curve(raw: _Raw, origin: Float, scale: float, spacing: Float | None) -> Curve:
+def _curve(raw: RawCurve, origin: Float, scale: float, spacing: Float | None) -> Curve:
     points = (raw.points - origin) / scale
     arclength = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(points, axis=0) ** 2).sum(1)))])
     if spacing is not None:
@@ -323,35 +201,6 @@ def _height(points: Float) -> float:
     spread = (points - points.mean(axis=0)) @ np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
     extent = np.ptp(spread, axis=0)
     return float(extent[2] / max(extent[0], np.finfo(float).tiny))
-
-
-def _check_contacts(
-    vertices: _Vertices, raw: list[_Raw], kept: list[_Raw], bounds: dict[int, list[int]], points: dict[int, list[int]]
-) -> None:
-    """Refuse a face that another one touches in a vertex to which only a seam or a pole of it leads: no node would be there."""
-    ends, own = {r.tag: set(r.ends) for r in raw}, {r.tag: set(r.ends) for r in kept}
-    used = set().union(*own.values(), *points.values())
-    for f, curves in bounds.items():
-        left = set().union(*(ends[c] for c in curves)) - set().union(*(own.get(c, set()) for c in curves), points[f])
-        for v in sorted(left & used):
-            remedy = "split the face there, or move the faces apart"
-            place = vertices.points[v].tolist()
-            raise GeometryError(
-                "another face touches this one in a point of its seam", entity=(2, f), location=place, remedy=remedy
-            )
-
-
-def _needed_vertices(
-    vertices: _Vertices, kept: list[_Raw], points: dict[int, list[int]]
-) -> tuple[_Vertices, dict[int, list[int]]]:
-    """The vertices at curves that are kept, and embedded points; the rows in `kept` are changed, those in `points` returned."""
-    used = sorted({v for r in kept for v in r.ends} | {v for rows in points.values() for v in rows})
-    new = {old: i for i, old in enumerate(used)}
-    tags = [vertices.tags[v] for v in used]
-    for r in kept:
-        r.ends = [new[v] for v in r.ends]
-    fewer = _Vertices(tags, [vertices.points[v] for v in used], {t: i for i, t in enumerate(tags) if t >= 0})
-    return fewer, {f: [new[v] for v in rows] for f, rows in points.items()}
 
 
 def _face(
