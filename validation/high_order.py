@@ -4,8 +4,8 @@
 
 A number after "=" is the size.  Qualities are the least that Gmsh's `getElementQualities` gives: "minSICN", "minSJ", and
 "minDetJac", over the median of its "maxDetJac".  Distances are those of the nodes of high order from the point of their curve
-at their parameter, or from the one that Gmsh's `getClosestPoint` finds on their face, over the diagonal of the model.  (On built-in
-splines that function is far off.)  Every model has a process of its own, and two minutes of CPU.
+at their parameter, or from the one that Gmsh's `getClosestPoint` finds on their face, over the diagonal of the model.  (On
+built-in splines that function is far off.)  Every model has a process of its own, and two minutes of CPU.
 """
 
 import json
