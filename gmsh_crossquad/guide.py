@@ -10,7 +10,8 @@ from .cusps import cusp_corners
 from .embed.place import place
 from .embed.smooth import smooth
 from .errors import LayoutError, MeshError
-from .fill.curve_edges import chords_to_divide, graded, steep_chords
+from .fill.area_loss import followed
+from .fill.curve_edges import chords_to_divide, graded
 from .fill.filler import Filler
 from .fill.numbering import guide_chords
 from .layout.chords import Chords, arc_divisions, find_chords
@@ -31,7 +32,6 @@ GROWTH = 3
 WORTH_REFINING = 0.02
 SMALL = 1_000  # cells up to which any grid is refined: so few may be too few for two singularities that are close
 MOST_QUADS, QUADS_PER_FACE = 25_000, 100
-DOUBLINGS = 3  # of the final edges on curves that turn too much
 LARGE, HUGE = 6_000, 10_000  # cells of a shell from which it is refined for folded cells only, and not at all
 
 
@@ -152,9 +152,11 @@ def smooth_guide(
         if not len(bad):
             with watch.stage("fill"):
                 bad, folded = filler.poor_cells(guide, fine)
-                steep = steep_chords(model, surfaces, guide, fine)
-                if not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any()):
-                    fine, steep = _divided(filler, guide, fine, steep)
+                more = followed(model, surfaces, guide, fine)
+                steep = np.flatnonzero(more != fine)
+                only_fine = not len(bad) and (surfaces.curved.any() or cusp_corners(guide, model).any())
+                if len(steep) and only_fine and not len(filler.poor_cells(guide, more)[1]):
+                    fine, steep = more, steep[:0]
         score = (-len(folded), -len(steep), -len(bad), report.min_scaled_jacobian)
         if best is None or score > best[0]:
             best = score, guide, fine
@@ -182,19 +184,6 @@ def smooth_guide(
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
     return GuideResult(guide, fine, quality, tuple(notes))
-
-
-def _divided(filler: Filler, guide: Guide, fine: Int, steep: Int) -> tuple[Int, Int]:
-    """Final edges per guide edge, doubled on steep chords as often as it helps, and the chords that stay steep."""
-    for _ in range(DOUBLINGS):
-        if not len(steep):
-            break
-        more = fine.copy()
-        more[steep] *= 2
-        if len(filler.poor_cells(guide, more)[1]):
-            break
-        fine, steep = more, steep_chords(filler.model, filler.surfaces, guide, more)
-    return fine, steep
 
 
 def _curve_fine(chords: Chords, divisions: ChordDivisions, pieces: tuple[int, ...]) -> Int:

@@ -1,11 +1,10 @@
 """Chords of a guide grid that should get more edges, judged by the guide's edges on CAD curves and in curved faces.
 
 An edge of length l over which the curve turns by t bulges by l t / 8 from its chord.  Where that is much of the height of the
-cell beside it the cell folds: the edge needs division, the height none.  Final edges may turn by no more than a limit, and an
-edge far from its neighbours, measured in their lengths (`curve_fit`), is halved without smoothing again.
+cell beside it the cell folds: the edge needs division, the height none.  An edge far from its neighbours, measured in their
+lengths (`curve_fit`), is halved without smoothing again.
 
-Inside a curved face an edge turns as the surface's normal does, from one end to the middle to the other end.  A chord that turns
-by t is shorter than its arc by t^2 / 24 of it, so a final quad loses that part of its area in both directions.
+Inside a curved face an edge turns as the surface's normal does, from one end to the middle to the other end.
 """
 
 from __future__ import annotations
@@ -13,17 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..layout.divisions import cumulative_turning
-from ..records import Bool, Float, Guide, Int, Model
+from ..records import Float, Guide, Int, Model
 from ..surfaces import Surfaces
 from .curve_fit import misfits
 from .numbering import guide_chords
 
-__all__ = ["chords_to_divide", "graded", "steep_chords"]
+__all__ = ["chords_to_divide", "edges_on_curves", "graded", "surface_turning"]
 
-# greatest turning of a final edge on a curve; the smaller one where the edges lose more than this part of a face's area
-STEEP = np.radians(60.0)
-STEEP_ROUND = np.radians(20.0)
-LOST = 0.016
 # bulge of a curve over an edge, of the height of the bad cell beside it, from which only the edge is divided
 BULGE = 0.3
 # edges on curves this far from their neighbours, in lengths of these, are halved a few times, while the mesh grows by no more
@@ -37,10 +32,10 @@ def chords_to_divide(model: Model, surfaces: Surfaces, guide: Guide, bad: Int) -
     bulges by much of the cell's height; else both."""
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
     length = np.linalg.norm(guide.points[edges[:, 1]] - guide.points[edges[:, 0]], axis=1)
-    row, _, turn = _surface_turning(surfaces, guide, edges, quad_edges)
+    row, _, turn = surface_turning(surfaces, guide, edges, quad_edges)
     bulge = np.zeros(len(edges))
     np.maximum.at(bulge, row, length[row] * turn / 8.0)
-    for row, arc, turn in _curve_edges(model, guide, edges):
+    for row, arc, turn in edges_on_curves(model, guide, edges):
         bulge[row] = arc * turn / 8.0
     mine = quad_edges[bad]
     height = np.minimum(length[np.roll(mine, 1, axis=1)], length[np.roll(mine, -1, axis=1)])
@@ -49,7 +44,7 @@ def chords_to_divide(model: Model, surfaces: Surfaces, guide: Guide, bad: Int) -
     return np.unique(chord[mine[over]])
 
 
-def _curve_edges(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Float, Float]]:
+def edges_on_curves(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Float, Float]]:
     """For every curve the rows of `edges` of its guide edges, their arc lengths and their turning."""
     n = len(guide.points)
     keys = edges[:, 0] * n + edges[:, 1]
@@ -62,7 +57,7 @@ def _curve_edges(model: Model, guide: Guide, edges: Int) -> list[tuple[Int, Floa
     return out
 
 
-def _surface_turning(surfaces: Surfaces, guide: Guide, edges: Int, quad_edges: Int) -> tuple[Int, Int, Float]:
+def surface_turning(surfaces: Surfaces, guide: Guide, edges: Int, quad_edges: Int) -> tuple[Int, Int, Float]:
     """Row of every edge of every curved face (ordered by face), that face, and by what its normal turns along the edge."""
     q = np.flatnonzero(surfaces.curved[guide.quad_face])
     if not len(q):
@@ -80,70 +75,10 @@ def _angle(a: Float, b: Float) -> Float:
     return out
 
 
-def steep_chords(model: Model, surfaces: Surfaces, guide: Guide, fine: Int) -> Int:
-    """Guide chords of edges on CAD curves and in curved faces that the final edges do not follow well enough.
-
-    An edge may turn by `STEEP`.  An edge of length l on a curve that turns by t within a face cuts about l^2 t / 12 off; where
-    that adds up to more than `LOST` of the area of a face at the curve, its edges may turn by `STEEP_ROUND`.  So may those of
-    curved faces that lose more than that part of their area, if the model or a physical surface does so as a whole.
-    """
-    edges, quad_edges, chord, _ = guide_chords(guide.quads)
-    diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
-    areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
-    face_area: Float = np.bincount(guide.quad_face, areas, minlength=len(model.faces)).astype(np.float64)
-    curves = _curve_edges(model, guide, edges)
-    bent, bent_face, bend = _surface_turning(surfaces, guide, edges, quad_edges)
-    rows, turns = [], []
-    lost = np.zeros(len(model.curves))
-    for c, (row, length, turn) in enumerate(curves):
-        pieces = fine[chord[row]]
-        rows.append(row)
-        turns.append(turn / pieces)
-        lost[c] = np.sum(length**2 / pieces * turns[-1] / 12)
-    limit = np.full(len(model.curves), STEEP)
-    for f, face in enumerate(model.faces):
-        around = [c for loop in face.loops for c, _ in loop]
-        off = lost[around].sum()
-        if face.curved:  # what the curve turns with the surface cuts nothing off
-            with_face = np.zeros(len(edges))
-            with_face[bent[bent_face == f]] = bend[bent_face == f]
-            for row, length, turn in (curves[c] for c in around):
-                within = np.sqrt(np.maximum(turn**2 - with_face[row] ** 2, 0.0))
-                off -= np.sum(length**2 / fine[chord[row]] ** 2 * (turn - within) / 12)
-        if off > LOST * face_area[f]:
-            limit[around] = STEEP_ROUND
-    steep = np.zeros(len(edges), bool)
-    for row, turn, most in zip(rows, turns, limit):
-        steep[row] = turn > most
-    if surfaces.curved.any():
-        bend /= fine[chord[bent]]
-        key = bent_face * len(edges) + bent
-        q = np.flatnonzero(surfaces.curved[guide.quad_face])
-        side = bend[np.searchsorted(key, guide.quad_face[q, None] * len(edges) + quad_edges[q])]
-        share = (np.maximum(side[:, :2], side[:, 2:]) ** 2).sum(axis=1) / 24
-        flattened: Float = np.bincount(guide.quad_face[q], areas[q] * share, minlength=len(face_area)).astype(np.float64)
-        strict = _too_flat(model, face_area, flattened)
-        steep[bent[bend > np.where(strict[bent_face], STEEP_ROUND, STEEP)]] = True
-    return np.unique(chord[steep])
-
-
-def _too_flat(model: Model, area: Float, lost: Float) -> Bool:
-    """(f,) Faces that lose more than `LOST` of their `area` (f,), where the model or a physical surface with them does so."""
-    out = np.zeros(len(area), bool)
-    named: dict[str, list[int]] = {}
-    for f, names in enumerate(model.face_names):
-        for name in names:
-            named.setdefault(name, []).append(f)
-    for faces in (list(range(len(area))), *named.values()):
-        if lost[faces].sum() > LOST * area[faces].sum():
-            out[faces] = True
-    return out & (lost > LOST * area)
-
-
 def graded(model: Model, guide: Guide, fine: Int) -> Int:
     """Final edges per guide edge of every guide chord, doubled where edges on curves are much longer than those beside them."""
     edges, quad_edges, chord, _ = guide_chords(guide.quads)
-    curves = _curve_edges(model, guide, edges)
+    curves = edges_on_curves(model, guide, edges)
     if not curves:
         return fine
     prescribed = np.zeros(len(fine), bool)

@@ -1,13 +1,8 @@
 """Nodes of order 2 and 3: on the CAD curves, on the curved faces, and between them where a face is plane.
 
 Edges on a curve get nodes of the curve at equal chord lengths.  Edges inside a curved face get the points of the face next to
-the chord's, and the inside of a quad those next to Coons' rule.  Where that turns an element over (a bound on its Jacobian,
-`jacobians`), the new nodes of its edges and its inside go back towards the straight quad by halves, at last all the way.
-
-References
-----------
-.. [1] A. Johnen, J.-F. Remacle, C. Geuzaine, "Geometrical validity of curvilinear finite elements", Journal of Computational
-   Physics 233, 2013, 359-372.
+the chord's, and the inside of a quad those next to Coons' rule.  Where that turns an element over, the nodes are placed
+otherwise (`mend`).
 """
 
 from __future__ import annotations
@@ -22,6 +17,7 @@ from ..quad_edges import edges_of_quads
 from ..records import Bool, Float, Int, Model, QuadMesh
 from ..surfaces import Surfaces
 from .elements import Elements
+from .mend import mend
 
 __all__ = ["HighOrder", "high_order", "turned_over"]
 
@@ -98,31 +94,25 @@ def high_order(
     if order not in GRID:
         raise InputError(f"elements of order {order} cannot be made", remedy="use order 1, 2 or 3")
     edges, quad_edges = edges_of_quads(mesh.quads)
-    work = Elements.start(model, surfaces, mesh, order, edges, quad_edges)
-    rows, parameters, on_curves = [], [], []
+    work = Elements.start(model, surfaces, mesh, order, edges, quad_edges, evaluate, inner=not incomplete)
+    rows = []
     for row, chain in enumerate(mesh.curve_nodes):
         e, forward = _chain(edges, chain, len(mesh.points))
-        t = _places(evaluate, row, mesh.curve_parameters[row], order)
-        on_curves.append(evaluate(row, t.ravel()).reshape(*t.shape, 3))
-        x = (on_curves[-1] - model.origin) / model.scale
-        work.bulge[e] = np.where(forward[:, None, None], x, x[:, ::-1]) - work.straight[e]
+        work.put_on_curve(row, e, forward, mesh.curve_parameters[row], _places(evaluate, row, mesh.curve_parameters[row], order))
         rows.append((e, forward))
-        parameters.append(t.ravel())
-    on_curve = np.zeros(len(edges), bool)
-    on_curve[np.concatenate([e for e, _ in rows]) if rows else []] = True
+    on_curve = work.curve >= 0
     uses = np.bincount(quad_edges.ravel(), minlength=len(edges))
     if np.any(uses[~on_curve] != 2):
         raise MeshError("an edge inside a face has not two quads", remedy="report this model")
-    work.put_on_faces(on_curve, inside=not incomplete)
-    count, straighter = work.mend()
+    work.put_on_faces()
+    count, straighter = mend(work)
     notes: tuple[str, ...] = ()
     if count:
         notes = (
             f"{count} elements of order {order} would have been turned over: {np.count_nonzero(straighter)} of their edges "
             f"({np.count_nonzero(straighter & on_curve)} on curves) are straighter than the model",
         )
-    exact = [np.where(straighter[e, None, None], np.nan, x) for (e, _), x in zip(rows, on_curves, strict=True)]
-    return _record(model, mesh, work, rows, parameters, on_curve, exact, notes)
+    return _record(model, mesh, work, rows, notes)
 
 
 def turned_over(order: int) -> list[int]:
@@ -160,23 +150,21 @@ def _record(
     mesh: QuadMesh,
     work: Elements,
     rows: list[tuple[Int, Bool]],
-    parameters: list[Float],
-    on_curve: Bool,
-    exact: list[Float],
     notes: tuple[str, ...],
 ) -> HighOrder:
-    """Number the new nodes and write the elements; `exact` (k, p - 1, 3) nodes of curves in the user's coordinates, or NaN."""
+    """Number the new nodes and write the elements."""
     inner = work.order - 1
     first = np.zeros(len(work.edges), np.int64)  # first new node of every edge
     top = len(mesh.points)
-    curve_nodes, lines = [], []
+    curve_nodes, parameters, lines = [], [], []
     new = [np.zeros((0, 3))]
-    for (e, forward), chain, known in zip(rows, mesh.curve_nodes, exact, strict=True):
+    for (e, forward), chain in zip(rows, mesh.curve_nodes, strict=True):
         first[e] = top + inner * np.arange(len(e))
         nodes = first[e][:, None] + np.arange(inner)
-        x = work.straight[e] + work.bulge[e]
-        x = np.where(forward[:, None, None], x, x[:, ::-1]) * model.scale + model.origin
-        new.append(np.where(np.isnan(known), x, known).reshape(-1, 3))
+        x = (work.straight[e] + work.bulge[e]) * model.scale + model.origin
+        x = np.where(np.isnan(work.exact[e]), x, work.exact[e])
+        new.append(np.where(forward[:, None, None], x, x[:, ::-1]).reshape(-1, 3))
+        parameters.append(np.where(forward[:, None], work.t[e], work.t[e, ::-1]).ravel())
         lines.append(np.column_stack([chain[:-1], chain[1:], nodes]))
         curve_nodes.append(nodes.ravel())
         top += nodes.size
@@ -184,9 +172,7 @@ def _record(
     for e, forward in rows:
         step[e[~forward]] = -1
         first[e[~forward]] += inner - 1
-    edge_face = np.full(len(work.edges), -1)
-    edge_face[work.quad_edges] = mesh.quad_face[:, None]
-    edge_face[on_curve] = -1
+    edge_face = np.where(work.curve >= 0, -1, work.edge_face)
     inside_first = np.zeros(len(mesh.quads), np.int64)
     face_nodes = []
     for f in range(len(model.faces)):

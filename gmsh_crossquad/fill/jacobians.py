@@ -18,7 +18,7 @@ import numpy as np
 
 from ..records import Float
 
-__all__ = ["corner_jacobian", "least_jacobian", "quad_normals"]
+__all__ = ["corner_jacobian", "jacobian_matrices", "least_jacobian", "quad_normals"]
 
 CHUNK = 1 << 14
 PARTS = 4  # per direction, for quads that the bound on the whole leaves open
@@ -77,7 +77,7 @@ def _bound(grids: Float, normals: Float, parts: int) -> Float:
     second = np.cross(normals, first)
     a, b = np.einsum("qnc,qc->qn", x, first), np.einsum("qnc,qc->qn", x, second)
     out = np.full(n, np.inf)
-    for along, across, coefficients in _matrices(grids.shape[1] - 1, parts):
+    for along, across, coefficients in jacobian_matrices(grids.shape[1] - 1, parts):
         value = (a @ along) * (b @ across)
         value -= (a @ across) * (b @ along)
         np.minimum(out, (value @ coefficients).min(axis=1), out=out)
@@ -86,9 +86,15 @@ def _bound(grids: Float, normals: Float, parts: int) -> Float:
 
 
 @cache
-def _matrices(p: int, parts: int) -> tuple[tuple[Float, Float, Float], ...]:
-    """For every part, from nodes ((p + 1)^2, ...) to derivatives along u and v at ``(2 p)^2`` places, and from values there to
-    Bernstein coefficients."""
+def jacobian_matrices(p: int, parts: int) -> tuple[tuple[Float, Float, Float], ...]:
+    """Matrices to Bernstein coefficients of the Jacobian on `parts` x `parts` parts of an element of order p.
+
+    Returns
+    -------
+    tuple of (along, across, coefficients)
+        For every part, from nodes ((p + 1)^2, s) to derivatives along u and v at s = (2 p)^2 places, and from Jacobians there
+        (s, s) to Bernstein coefficients.
+    """
     nodes = np.arange(p + 1) / p
     local = np.arange(2 * p) / (2 * p - 1)
     lagrange = np.linalg.inv(np.vander(nodes, increasing=True))
