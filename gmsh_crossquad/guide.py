@@ -14,6 +14,7 @@ from .fill.area_loss import followed
 from .fill.curve_edges import chords_to_divide, graded
 from .fill.filler import Filler
 from .fill.numbering import guide_chords
+from .layout.alignment import LEAST
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.quantize import Indivisible, quantize
@@ -59,29 +60,31 @@ class GuideResult:
     notes: tuple[str, ...]
 
 
-def coarse_divisions(model: Model, tmesh: TMesh, block: Float) -> Int:
+def coarse_divisions(model: Model, tmesh: TMesh, block: Float, shift: float = LEAST) -> Int:
     """Coarse divisions of the arcs for the wanted block edge `block` (a,) along every arc, checked.
+
+    `shift` is what `quantize` takes.
 
     Raises
     ------
     LayoutError
     """
-    coarse = _quantized(model, tmesh, tmesh.length / block)
+    coarse = _quantized(model, tmesh, tmesh.length / block, shift)
     wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
     if wrong:
         raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
     return coarse
 
 
-def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
+def _quantized(model: Model, tmesh: TMesh, target: Float, shift: float) -> Int:
     """Divisions of the arcs; blocks on a curve with prescribed nodes are no more than its segments, also where they are large."""
-    coarse = quantize(model, tmesh, target).divisions
+    coarse = quantize(model, tmesh, target, shift=shift).divisions
     most = {c: len(curve.spacing) - 1 for c, curve in enumerate(model.curves) if curve.spacing is not None}
     over = [c for c, n in most.items() if coarse[list(tmesh.pieces[c])].sum() > n]
     if not over:
         return coarse
     try:
-        return quantize(model, tmesh, target, at_most=most).divisions
+        return quantize(model, tmesh, target, at_most=most, shift=shift).divisions
     except Indivisible as error:
         tag, n = model.curves[over[0]].tag, most[over[0]]
         raise LayoutError(
