@@ -203,6 +203,8 @@ def check_mesh(mesh: MeshArrays) -> Report:
     inverted = int((quality <= 0.0).sum())
     if inverted:
         faults.append(f"{inverted} inverted cells")
+    if mesh.folded:
+        faults.append(f"{mesh.folded} elements of order 2 or 3 are turned over")
     if hanging:
         faults.append(f"not conforming at {hanging} edges")
     if _turned_over(mesh):

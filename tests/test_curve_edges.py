@@ -10,7 +10,7 @@ import pytest
 from gmsh_crossquad.fill.curve_edges import BULGE, MOST_GRADED, chords_to_divide, graded
 from gmsh_crossquad.fill.curve_fit import misfits
 from gmsh_crossquad.fill.numbering import guide_chords
-from gmsh_crossquad.fill.pipeline import _with_bundle
+from gmsh_crossquad.fill.placed import _with_bundle
 from gmsh_crossquad.surfaces import Planes
 from tests.smoothing_grids import mapped_grid, rectangle, sector
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import gmsh
@@ -36,12 +35,7 @@ class Tilted:
         return self.across[face]
 
 
-@pytest.fixture(autouse=True)
-def session() -> Iterator[None]:
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("fresh_gmsh")
 
 
 def bent_edge(uses: int, embedded: bool = False, off: float = OFF) -> Model:

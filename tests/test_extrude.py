@@ -17,13 +17,7 @@ HEXAHEDRA = {1: 5, 2: 12, 3: 92}
 INCOMPLETE = 17
 
 
-@pytest.fixture(autouse=True)
-def session():
-    gmsh.initialize(interruptible=False, readConfigFiles=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    if gmsh.isInitialized():
-        gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("fresh_gmsh")
 
 
 def plate():

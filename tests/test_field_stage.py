@@ -15,13 +15,7 @@ from gmsh_crossquad.source.function import Function
 from gmsh_crossquad.source.per_face import PerFace
 from gmsh_crossquad.stages import block_mesh
 
-
-@pytest.fixture(autouse=True)
-def session():
-    gmsh.initialize(readConfigFiles=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("fresh_gmsh")
 
 
 def round_plate(arcs, names=(), inside=()):

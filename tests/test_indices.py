@@ -27,12 +27,7 @@ Physical Surface("left part") = {11}; Physical Surface("right") = {12}; Physical
 """
 
 
-@pytest.fixture(autouse=True, scope="module")
-def session():
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("gmsh_session")
 
 
 @pytest.fixture

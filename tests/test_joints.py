@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import gmsh
 import numpy as np
@@ -23,12 +23,7 @@ BOX = np.array([1.0, 1.3, 1.6])
 RADIUS = 0.2
 
 
-@pytest.fixture(autouse=True)
-def session() -> Iterator[None]:
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("fresh_gmsh")
 
 
 def two_halves() -> None:

@@ -9,12 +9,7 @@ from gmsh_crossquad.errors import InputError
 SQUARE = 'SetFactory("OpenCASCADE"); Rectangle(1) = {0, 0, 0, 1, 1};\n'
 
 
-@pytest.fixture(autouse=True, scope="module")
-def session():
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("gmsh_session")
 
 
 @pytest.fixture(autouse=True)

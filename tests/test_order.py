@@ -61,6 +61,24 @@ def test_order_by_option(ellipse, order, capfd):
     assert cli.main(["check", "a.msh", "--model", "a.geo"]) == 0
 
 
+@pytest.mark.parametrize("arguments", [("2",), ("2", "--incomplete"), ("3",)])
+def test_check_finds_curved_elements_that_are_turned_over(ellipse, session, arguments, capfd):
+    """A node of an edge is moved behind the opposite side; the corners, all that the scaled Jacobian sees, are as before."""
+    assert cli.main(["mesh", "a.geo", "-o", "a.msh", "--size", "0.3", "--quiet", "--order", *arguments]) == 0
+    assert cli.main(["check", "a.msh"]) == 0
+    gmsh.open("a.msh")
+    kinds, _, nodes = gmsh.model.mesh.getElements(2)
+    count = gmsh.model.mesh.getElementProperties(kinds[0])[3]
+    row = nodes[0].reshape(-1, count)[5]
+    ends, middle = (np.array([gmsh.model.mesh.getNode(n)[0] for n in row[k]]) for k in (slice(4), slice(4, 5)))
+    gmsh.model.mesh.setNode(row[4], middle[0] + 1.5 * (ends[2] + ends[3] - ends[0] - ends[1]) / 2, [])
+    gmsh.write("a.msh")
+    capfd.readouterr()
+    assert cli.main(["check", "a.msh"]) == 1
+    out = capfd.readouterr().out
+    assert "inverted cells         0" in out and "elements of order 2 or 3 are turned over" in out
+
+
 def test_order_by_the_model_and_option_before_it(ellipse):
     (ellipse / "a.geo").write_text(ELLIPSE + "Mesh.ElementOrder = 2; Mesh.SecondOrderIncomplete = 1;\n")
     assert cli.main(["mesh", "a.geo", "-o", "a.msh", "--size", "0.3", "--quiet"]) == 0

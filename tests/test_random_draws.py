@@ -1,6 +1,5 @@
 """Properties of the whole pipeline on random domains, boundary indices and singularities."""
 
-import gmsh
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,13 +8,7 @@ from hypothesis import strategies as st
 from validation.domains import FAMILIES, draw
 from validation.random_draws import outcome
 
-
-@pytest.fixture(scope="module", autouse=True)
-def session():
-    gmsh.initialize(interruptible=False, readConfigFiles=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("gmsh_session")
 
 
 @given(st.integers(0, 100_000))

@@ -15,13 +15,7 @@ from gmsh_crossquad.errors import GeometryError
 from gmsh_crossquad.options import MeshOptions
 from gmsh_crossquad.records import Curve
 
-
-@pytest.fixture(autouse=True, scope="module")
-def session():
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("gmsh_session")
 
 
 @pytest.fixture(autouse=True)

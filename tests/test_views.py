@@ -18,12 +18,7 @@ TENSOR = (5 * np.outer(ARM, ARM) + 2 * np.diag([1.0, 1.0, 0.0])).ravel()
 VALUES = {"vector": ARM, "tensor": TENSOR, "angle": np.array([ANGLE])}
 
 
-@pytest.fixture(autouse=True, scope="module")
-def session():
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    yield
-    gmsh.finalize()
+pytestmark = pytest.mark.usefixtures("gmsh_session")
 
 
 @pytest.fixture(autouse=True)

@@ -25,6 +25,7 @@ __all__ = ["MeshArrays", "is_running", "open_model", "physical_groups", "read_me
 
 _CORNERS = {1: 2, 8: 2, 26: 2, 2: 3, 9: 3, 21: 3, 3: 4, 10: 4, 16: 4, 36: 4, 15: 1}
 """Corners of Gmsh's lines, triangles, quads (orders 1 to 3) and points, by element type."""
+_CURVED = (10, 16, 36)  # quads of order 2 and 3
 
 
 def is_running() -> bool:
@@ -108,6 +109,8 @@ class MeshArrays:
         Physical groups; an unnamed one goes by its number.
     physical : dict of (dim, entity tag) -> physical number
         The first group of an entity.
+    folded : int
+        Quads of order 2 and 3 whose Jacobian is not positive everywhere (Gmsh's "minDetJac").
     """
 
     points: Float
@@ -119,6 +122,7 @@ class MeshArrays:
     line_entity: Int
     groups: dict[tuple[int, str], tuple[int, ...]]
     physical: dict[tuple[int, int], int]
+    folded: int = 0
 
 
 def physical_groups() -> dict[tuple[int, str], tuple[int, ...]]:
@@ -172,4 +176,11 @@ def read_mesh() -> MeshArrays:
         line_entity=cells[2][1],
         groups=physical_groups(),
         physical=physical,
+        folded=_folded(),
     )
+
+
+def _folded() -> int:
+    """Number of the quads of order 2 and 3 that have a place without a positive Jacobian."""
+    tags = [gmsh.model.mesh.getElementsByType(kind)[0] for kind in gmsh.model.mesh.getElementTypes(2) if kind in _CURVED]
+    return sum(int(np.sum(np.asarray(gmsh.model.mesh.getElementQualities(t, "minDetJac")) <= 0.0)) for t in tags)

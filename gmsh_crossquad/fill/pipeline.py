@@ -1,9 +1,7 @@
 """The final mesh from the smoothed guide grid.
 
-Curves first (exact CAD points, monotone spacing), then the inner guide edges (Hermite cubics), then all cells (Coons).  A
-cubic that bulges too much folds the cells beside it, and sides of a thin cell that grow differently shear it: where a fine
-quad is worse than half its guide quad, the edges of that cell are made straight and even step by step (on CAD curves, even
-only).  Only cells that touch a changed edge are computed again.
+Curves first (exact CAD points, monotone spacing), then the inner guide edges (Hermite cubics), then all cells (Coons); what is
+done where cells come out badly, `placed` says.
 
 On a curved face what cubics and Coons' rule give is put on the surface: the nodes inside guide edges first, those inside cells,
 which lie between them, afterwards.
@@ -12,29 +10,19 @@ which lie between them, afterwards.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..cusps import cusp_corners
 from ..errors import InputError, MeshError
-from ..records import Bool, Float, Guide, Int, Model, QuadMesh
+from ..records import Float, Guide, Int, Model, QuadMesh
 from ..surfaces import Surfaces
 from .cells import Cells
-from .curves import curve_parameters
-from .numbering import guide_chords, guide_topology, number
-from .skeleton import Frames, Skeleton
-from .tangents import continuation, end_tangents
+from .numbering import guide_chords
+from .placed import Placed
 
 __all__ = ["Placed", "fill", "mesh_of", "placed", "poor_cells", "poor_of", "shown_divisions"]
 
-# rounds of straightening: what each takes off the bulge and the unevenness; all of it where cells are still folded
-SHARES = (0.5,) * 6 + (1.0,) * 4
-BUNDLE = 256  # edges side by side that may have to be straightened together
-BULGE = 0.2  # of a cell's width, up to which an edge beside a straight one may bulge
-KEEP = 0.5  # a fine quad should have this part of its guide quad's scaled Jacobian
 SHOWN = 8  # divisions that show what any greater number would
-POOR = 0.05  # guide quads below this are held to this
 
 
 def fill(
@@ -157,160 +145,6 @@ def placed(
     work = Placed.start(model, surfaces, guide, divisions, evaluate, vertices)
     work.worst[:] = work.place(work.own)
     return work
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A mesh in the making; all arrays but `own`, and the positions in `cells.skeleton`, are filled in place.
-
-    Attributes
-    ----------
-    model : Model
-    cells : Cells
-    evaluate : callable
-    points : (n, 3) float64
-        Nodes, in the user's coordinates.
-    parameters : list of (k,) float64
-        Of the nodes of every curve.
-    own, worst : (q,) float64
-        Scaled Jacobian of every guide quad, and the least one of its fine quads.
-    """
-
-    model: Model
-    cells: Cells
-    evaluate: Callable[[int, Float], Float]
-    points: Float
-    parameters: list[Float]
-    own: Float
-    worst: Float
-
-    @classmethod
-    def start(
-        cls,
-        model: Model,
-        surfaces: Surfaces,
-        guide: Guide,
-        divisions: Int,
-        evaluate: Callable[[int, Float], Float],
-        vertices: Float | None,
-    ) -> Placed:
-        """Number all nodes and place those on CAD vertices."""
-        edges, quad_edges, chord, n_chords = guide_chords(guide.quads)
-        if len(divisions) != n_chords:
-            raise MeshError(f"{len(divisions)} divisions for {n_chords} guide chords", remedy="report this model")
-        topology = guide_topology(guide, edges, quad_edges)
-        pieces = np.asarray(divisions, np.int64)[chord]
-        numbering = number(guide, topology, pieces, len(model.vertices), len(model.faces))
-        points = np.empty((numbering.n_nodes, 3))
-        used = numbering.vertex_node >= 0
-        exact = model.vertices * model.scale + model.origin if vertices is None else vertices
-        points[numbering.vertex_node[used]] = exact[used]
-        skeleton = Skeleton.start(guide, pieces)
-        skeleton.put_vertices(guide, topology, surfaces)
-        cells = Cells(guide, topology, numbering, skeleton, Frames.of(model), surfaces, cusp_corners(guide, model))
-        parameters = [np.empty(0)] * len(guide.chains)
-        work = cls(model, cells, evaluate, points, parameters, np.empty(0), np.empty(len(guide.quads)))
-        for row in range(len(guide.chains)):
-            work.put_curve(row, np.zeros(len(edges)))
-        return replace(work, own=cells.corner_quality())
-
-    def put_curve(self, row: int, even: Float) -> None:
-        """Place the nodes of a CAD curve; `even` (e,) as in `curve_parameters`, per guide edge."""
-        cells, model = self.cells, self.model
-        curve, chain, nodes = model.curves[row], cells.guide.chains[row], cells.numbering.curve_nodes[row]
-        e = cells.topology.chain_edges[row]
-        s = cells.guide.arclength[chain]
-        s[0], s[-1] = 0.0, curve.length
-        t = curve_parameters(curve, s, cells.numbering.divisions[e], even[e])
-        if len(t) > 2:
-            self.points[nodes[1:-1]] = self.evaluate(row, t[1:-1])
-        self.parameters[row] = t
-        cells.skeleton.put_chain(chain, e, cells.topology.chain_forward[row], (self.points[nodes] - model.origin) / model.scale)
-
-    def wanted(self, own: Float) -> Float:
-        """(q,) Least scaled Jacobian that the fine quads of every cell should have; in cusps any that is positive."""
-        out: Float = np.where(self.cells.cusps.any(axis=1), np.finfo(float).tiny, KEEP * np.maximum(own, POOR))
-        return out
-
-    def place(self, own: Float) -> Float:
-        """Place all that is inside faces, straightening the edges of bad cells; the least scaled Jacobian of every cell."""
-        cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
-        edges, quad_edges = topology.edges, topology.quad_edges
-        tangents = end_tangents(skeleton.vertices, edges, skeleton.divisions, continuation(cells.guide.quads, topology))
-        on_surfaces = cells.frames.curved, cells.surfaces
-        skeleton.put_cubics(np.flatnonzero(~topology.on_curve), topology, tangents, *on_surfaces)
-        worst = cells.place(np.arange(len(quad_edges)), self.points)
-        worst = self._bend(worst, tangents)
-        even, wanted = np.zeros(len(edges)), self.wanted(own)
-        for share in SHARES:
-            bad: Bool = worst <= 0.0 if share == 1.0 else worst < wanted
-            soft: Bool = np.zeros(len(edges), bool)
-            soft[quad_edges[bad]] = True
-            soft &= skeleton.divisions > 1
-            if share == 1.0 and np.any(soft):
-                soft = _with_bundle(soft, quad_edges, *skeleton.bulges(edges))
-            if not np.any(soft):
-                continue
-            even[soft] += share * (1.0 - even[soft])
-            for row, e in enumerate(topology.chain_edges):
-                if np.any(soft[e]):
-                    self.put_curve(row, even)
-            e = np.flatnonzero(soft & ~topology.on_curve)
-            chord = skeleton.vertices[edges[e, 1]] - skeleton.vertices[edges[e, 0]]
-            tangents[e] += share * (chord[:, None] - tangents[e])
-            skeleton.put_cubics(e, topology, tangents, *on_surfaces)
-            again = np.flatnonzero(np.any(soft[quad_edges], axis=1))
-            worst[again] = cells.place(again, self.points)
-        skeleton.write(self.points, cells.guide, cells.numbering, topology, cells.frames)
-        return worst
-
-    def _bend(self, worst: Float, tangents: Float) -> Float:
-        """Let the inner sides of folded cells run along the CAD curve on the other side, where that is better.
-
-        Between two curves that touch in a corner and part slowly a straight side would cross them at any size of the cells.
-        """
-        cells, topology, skeleton = self.cells, self.cells.topology, self.cells.skeleton
-        for q in np.flatnonzero(worst <= 0.0).tolist():
-            for k in range(4):
-                e, o = topology.quad_edges[q, k].item(), topology.quad_edges[q, (k + 2) % 4].item()
-                if topology.on_curve[e] or not topology.on_curve[o] or skeleton.divisions[e] < 2:
-                    continue
-                nodes = skeleton.vertices[topology.edges[o]]
-                line = np.concatenate([nodes[:1], skeleton.edge(o), nodes[1:]])
-                if cells.reverse(np.array([q]), k)[0] != cells.reverse(np.array([q]), (k + 2) % 4)[0]:
-                    line = line[::-1]
-                ends = skeleton.vertices[topology.edges[e]]
-                chord, other = ends[1] - ends[0], line[-1] - line[0]
-                ratio = float(np.linalg.norm(chord) / max(float(np.linalg.norm(other)), np.finfo(float).tiny))
-                slopes = (len(line) - 1) * np.stack([line[1] - line[0], line[-1] - line[-2]])
-                before = tangents[e].copy()
-                tangents[e] = chord + ratio * (slopes - other)
-                again = np.flatnonzero((topology.quad_edges == e).any(axis=1))
-                on_surfaces = cells.frames.curved, cells.surfaces
-                skeleton.put_cubics(np.array([e]), topology, tangents, *on_surfaces)
-                new = cells.place(again, self.points)
-                if new.min() > worst[again].min():
-                    worst[again] = new
-                else:
-                    tangents[e] = before
-                    skeleton.put_cubics(np.array([e]), topology, tangents, *on_surfaces)
-                    cells.place(again, self.points)
-        return worst
-
-
-def _with_bundle(straight: Bool, quad_edges: Int, bulge: Float, length: Float) -> Bool:
-    """Edges to straighten with those given: opposite ones, cell by cell, that bulge by much of the width between the two."""
-    out = straight.copy()
-    for _ in range(BUNDLE):
-        more = np.zeros(len(out), bool)
-        for k in range(4):
-            here, there = quad_edges[:, k], quad_edges[:, (k + 2) % 4]
-            width = 0.5 * (length[quad_edges[:, (k + 1) % 4]] + length[quad_edges[:, (k + 3) % 4]])
-            more[there[out[here] & (bulge[there] > BULGE * width)]] = True
-        if not np.any(more & ~out):
-            break
-        out |= more
-    return out
 
 
 def _refuse_folds(model: Model, guide: Guide, own: Float, worst: Float) -> None:

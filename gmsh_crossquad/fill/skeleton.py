@@ -134,13 +134,24 @@ class Skeleton:
         row = self.first[edges][owner] + np.where(forward[owner], j, self.divisions[edges][owner] - 2 - j)
         self.inside[row] = nodes[place[owner] + 1 + j]
 
-    def put_cubics(self, which: Int, topology: GuideTopology, tangents: Float, curved: Bool, surfaces: Surfaces) -> None:
-        """Put cubics with the given end `tangents` (e, 2, 3) on the edges `which`, and those in `curved` (f,) faces on these."""
+    def put_cubics(
+        self,
+        which: Int,
+        topology: GuideTopology,
+        tangents: Float,
+        curved: Bool,
+        surfaces: Surfaces,
+        offsets: Float | None = None,
+    ) -> None:
+        """Put cubics with the given end `tangents` (e, 2, 3) on the edges `which`, shifted by `offsets` (as `inside`), and those
+        in `curved` (f,) faces on these."""
         edges = topology.edges
         for count in np.unique(self.divisions[which]).tolist():
             e = which[self.divisions[which] == count]
             rows = self.rows(e, np.zeros(len(e), bool), count)
             self.inside[rows] = cubic(self.vertices[edges[e, 0]], self.vertices[edges[e, 1]], tangents[e], count)
+            if offsets is not None:
+                self.inside[rows] += offsets[rows]
         bent = which[curved[topology.edge_face[which]]]
         if len(bent):
             owner, j = _ragged(self.divisions[bent] - 1)
