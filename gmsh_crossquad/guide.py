@@ -173,15 +173,21 @@ def smooth_guide(
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, surfaces, guide, bad), steep)])] *= 2
+        chosen = chords_to_divide(model, surfaces, guide, bad)
+        if not (len(bad) and surfaces.curved.any()):  # there only final edges are added for the area, once no cell is bad
+            chosen = np.union1d(chosen, steep)
+        finer[np.unique(coarse_chord[chosen])] *= 2
     assert best is not None
-    (folds, _, _, quality), guide, fine = best
+    (folds, steeps, _, quality), guide, fine = best
     if folds:
         raise MeshError(
             f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",
             remedy="a smaller size may help",
         )
     with watch.stage("fill"):
+        if steeps and surfaces.curved.any():  # left since some cells stayed poor
+            more = followed(model, surfaces, guide, fine)
+            fine = fine if len(filler.poor_cells(guide, more)[1]) else more
         halved = graded(model, guide, fine)
         if (halved != fine).any() and not len(filler.poor_cells(guide, halved)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
