@@ -5,18 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .field_stage import Rule, Wishes
+from .layout.alignment import LEAST
 from .options import MeshOptions
 
 __all__ = ["Attempt", "attempts"]
 
 
 class Attempt(NamedTuple):
-    """Factors on the edge length of the background and of blocks, whether short curves cap the divisions of chords, and what is
+    """Factors on the edge length of the background and of blocks, whether short curves cap the divisions of chords, the
+    shift between the sides of strips that costs nothing (see `layout.alignment`), and what is
     done with a given field (see `field_of_face`)."""
 
     background: float = 1.0
     blocks: float = 1.0
     capped: bool = True
+    shift: float = LEAST
     rule: Rule = "keep"
     pinned: bool = True
 
@@ -24,7 +27,7 @@ class Attempt(NamedTuple):
 ATTEMPTS = (
     Attempt(),
     Attempt(blocks=0.4),
-    Attempt(capped=False),
+    Attempt(capped=False, shift=0.6),
     Attempt(blocks=0.15),
     Attempt(background=0.7),
     Attempt(rule="divisible"),

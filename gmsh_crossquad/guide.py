@@ -14,6 +14,7 @@ from .fill.area_loss import followed
 from .fill.curve_edges import chords_to_divide, graded
 from .fill.filler import Filler
 from .fill.numbering import guide_chords
+from .layout.alignment import LEAST
 from .layout.chords import Chords, arc_divisions, find_chords
 from .layout.divisions import ChordDivisions, chord_divisions
 from .layout.quantize import Indivisible, quantize
@@ -59,29 +60,31 @@ class GuideResult:
     notes: tuple[str, ...]
 
 
-def coarse_divisions(model: Model, tmesh: TMesh, block: Float) -> Int:
+def coarse_divisions(model: Model, tmesh: TMesh, block: Float, shift: float = LEAST) -> Int:
     """Coarse divisions of the arcs for the wanted block edge `block` (a,) along every arc, checked.
+
+    `shift` is what `quantize` takes.
 
     Raises
     ------
     LayoutError
     """
-    coarse = _quantized(model, tmesh, tmesh.length / block)
+    coarse = _quantized(model, tmesh, tmesh.length / block, shift)
     wrong = problems(model, tmesh, quotient(tmesh, 3 * coarse))
     if wrong:
         raise LayoutError(f"the quantized layout is not valid ({wrong[0]})", remedy="another size may help")
     return coarse
 
 
-def _quantized(model: Model, tmesh: TMesh, target: Float) -> Int:
+def _quantized(model: Model, tmesh: TMesh, target: Float, shift: float) -> Int:
     """Divisions of the arcs; blocks on a curve with prescribed nodes are no more than its segments, also where they are large."""
-    coarse = quantize(model, tmesh, target).divisions
+    coarse = quantize(model, tmesh, target, shift=shift).divisions
     most = {c: len(curve.spacing) - 1 for c, curve in enumerate(model.curves) if curve.spacing is not None}
     over = [c for c, n in most.items() if coarse[list(tmesh.pieces[c])].sum() > n]
     if not over:
         return coarse
     try:
-        return quantize(model, tmesh, target, at_most=most).divisions
+        return quantize(model, tmesh, target, at_most=most, shift=shift).divisions
     except Indivisible as error:
         tag, n = model.curves[over[0]].tag, most[over[0]]
         raise LayoutError(
@@ -170,15 +173,21 @@ def smooth_guide(
             what = f"{len(bad)} guide cells could not be filled well" if len(bad) else "curves were not followed well"
             notes.append(f"{what}; chords were refined")
         finer = divisions.guide.copy()
-        finer[np.unique(coarse_chord[np.union1d(chords_to_divide(model, surfaces, guide, bad), steep)])] *= 2
+        chosen = chords_to_divide(model, surfaces, guide, bad)
+        if not (len(bad) and surfaces.curved.any()):  # there only final edges are added for the area, once no cell is bad
+            chosen = np.union1d(chosen, steep)
+        finer[np.unique(coarse_chord[chosen])] *= 2
     assert best is not None
-    (folds, _, _, quality), guide, fine = best
+    (folds, steeps, _, quality), guide, fine = best
     if folds:
         raise MeshError(
             f"the layout cannot be laid into the faces without inverted cells ({-folds} of {len(guide.quads)})",
             remedy="a smaller size may help",
         )
     with watch.stage("fill"):
+        if steeps and surfaces.curved.any():  # left since some cells stayed poor
+            more = followed(model, surfaces, guide, fine)
+            fine = fine if len(filler.poor_cells(guide, more)[1]) else more
         halved = graded(model, guide, fine)
         if (halved != fine).any() and not len(filler.poor_cells(guide, halved)[1]):
             notes.append("edges on curves beside much shorter ones were divided")

@@ -85,9 +85,9 @@ def lay_out(
         # the program is much harder where most arcs are shorter than a block
         block = np.where(arcs > MANY_ARCS, np.maximum(0.25 * block, user_size), block)
         wanted = np.where(size < CROWDED * user_size, size, block)
-        if _known((*which, "sizes", wanted.tobytes()), seen):
+        if _known((*which, "sizes", attempt.shift, wanted.tobytes()), seen):
             return None
-        coarse = coarse_divisions(model, tmesh, wanted)
+        coarse = coarse_divisions(model, tmesh, wanted, attempt.shift)
         if _known((*which, "divisions", coarse.tobytes()), seen):
             return None
     evaluate = CurvePlaces.find(model, surfaces)

@@ -73,3 +73,10 @@ def test_crowds_of_nodes_are_thinned():
     rows, free, _ = alignment(tmesh, np.ones(n + 3))
     assert len(free) == MOST
     assert rows @ np.array([1] * n + [1, n, 1]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_less_may_be_free_in_narrow_strips_only():
+    narrow, wide = strip([3.0, 3.0], [2.0, 4.0], 0.1), strip([3.0, 3.0], [2.0, 4.0], 0.5)
+    assert alignment(narrow, np.ones(6), 0.6)[1] == pytest.approx(0.6)
+    assert alignment(narrow, np.ones(6), 0.6)[2] == pytest.approx(PRICE / 0.6)
+    assert alignment(wide, np.full(6, 12.0), 0.6)[1] == pytest.approx(alignment(wide, np.full(6, 12.0))[1])

@@ -166,13 +166,16 @@ def _wanted(
 
     The geometric mean over the chord's segments, raised where edges on a curve or in a curved face would turn much, capped by
     the short curves that the chord ends on, and raised again where edges would be long on a curve or hardly follow their shape.
+    What is shorter than `SHORT` sizes within a face needs no more than two edges for its bend: in a sliver a trace can turn back,
+    and it is one of hundreds of segments of a chord.
     """
+    bends = np.where(seg.length < SHORT * size, np.minimum(seg.bend, 2.0 * BEND), seg.bend)
     ratio = np.log(np.maximum(seg.length / size, SHORT))
     mean = np.exp(np.bincount(seg.chord, ratio, minlength=n) / np.maximum(np.bincount(seg.chord, minlength=n), 1))
     long = _largest(seg, n, np.where(tmesh.arc_curve[seg.arc] >= 0, seg.length / (LONGEST * size), 0.0))
     caps = _caps(model, tmesh, seg, n, size)
-    least = np.minimum(_largest(seg, n, np.maximum(seg.turning / turn, seg.bend / bend)), caps)
-    least = np.maximum(least, _largest(seg, n, np.maximum(seg.turning / STEEPEST, seg.bend / BEND)))
+    least = np.minimum(_largest(seg, n, np.maximum(seg.turning / turn, bends / bend)), caps)
+    least = np.maximum(least, _largest(seg, n, np.maximum(seg.turning / STEEPEST, bends / BEND)))
     if not capped:
         least = np.maximum(least, long)
     wanted = np.minimum(np.maximum(1, np.maximum(np.round(mean), long)), caps)

@@ -22,7 +22,7 @@ import scipy.sparse as sp
 
 from ..errors import LayoutError
 from ..records import Float, Int, Model, TMesh
-from .alignment import alignment
+from .alignment import LEAST, alignment
 from .arc_bends import arc_bends
 from .conditions import at_least, balance
 from .cuts import Cut, separation_cuts
@@ -77,6 +77,7 @@ def quantize(
     exact: dict[int, int] | None = None,
     at_most: dict[int, int] | None = None,
     disjunctions: bool = True,
+    shift: float = LEAST,
     progress: Callable[[str], None] | None = None,
 ) -> Quantization:
     """Integer divisions of every arc.
@@ -91,6 +92,8 @@ def quantize(
         Prescribed divisions of CAD curves (Transfinite).
     at_most : dict of curve row -> int, optional
         Upper bounds on the divisions of CAD curves.
+    shift : float
+        Shift between the sides of strips, in divisions, that costs nothing (module `alignment`).
     progress : callable, optional
         Told a line per round.
 
@@ -118,13 +121,13 @@ def quantize(
         start, column = on_columns.indptr[:-1].astype(np.int64), on_columns.indices.astype(np.int64)
         program.add_rows(lower - shift, most - shift, start, column, on_columns.data)
 
-    rows, slack, price = alignment(tmesh, target)
+    rows, slack, price = alignment(tmesh, target, shift)
     if len(slack):
         of_row = part[rows.indices[rows.indptr[:-1]]]
         first = program.add_columns(np.repeat(price, 2), np.full(2 * len(slack), np.inf), np.repeat(of_row, 2), integral=False)
         on_columns = (rows @ expand).tocoo()
         k = np.arange(len(slack))
-        shift = rows @ floor
+        moved = rows @ floor
         matrix = sp.csr_array(
             (
                 np.concatenate([on_columns.data, -np.ones(len(k)), np.ones(len(k))]),
@@ -135,7 +138,7 @@ def quantize(
             )
         )
         start, column = matrix.indptr[:-1].astype(np.int64), matrix.indices.astype(np.int64)
-        program.add_rows(-slack - shift, slack - shift, start, column, matrix.data)
+        program.add_rows(-slack - moved, slack - moved, start, column, matrix.data)
     sums = balance(tmesh)
     add(sums, np.zeros(sums.shape[0]), np.zeros(sums.shape[0]))
     for bounds, equal in ((exact or {}, True), (at_most or {}, False)):
