@@ -192,6 +192,7 @@ def smooth_guide(
         if (halved != fine).any() and not len(filler.poor_cells(guide, halved)[1]):
             notes.append("edges on curves beside much shorter ones were divided")
             fine = halved
+        fine = filler.unfolded(guide, fine)
     return GuideResult(guide, fine, quality, tuple(notes))
 
 

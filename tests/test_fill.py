@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from gmsh_crossquad.errors import InputError, MeshError
 from gmsh_crossquad.fill import placed
 from gmsh_crossquad.fill.coons import coons, grid_quads, grid_quality
 from gmsh_crossquad.fill.curves import curve_parameters, monotone_cubic
+from gmsh_crossquad.fill.filler import Filler
 from gmsh_crossquad.fill.numbering import guide_chords, guide_topology
 from gmsh_crossquad.fill.pipeline import fill, poor_cells
 from gmsh_crossquad.fill.tangents import continuation, cubic, end_tangents
@@ -616,3 +619,23 @@ def test_gmsh_follows_the_same_rule(n: int) -> None:
         gmsh.finalize()
     np.testing.assert_allclose(a.points, b.points, atol=1e-9)
     assert np.array_equal(a.quads, b.quads)
+
+
+def test_cells_that_fold_at_one_division_get_two(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, guide = grid(2, 2, 2.0, 2.0)
+    _, quad_edges, chord, n = guide_chords(guide.quads)
+    filler = Filler(model, Planes(model), straight(model))
+    ones = np.ones(n, np.int64)
+    np.testing.assert_array_equal(filler.unfolded(guide, ones), ones)
+    own = np.unique(chord[quad_edges[3]])
+
+    def placed_(guide: Guide, divisions: np.ndarray, needed: list[int]) -> SimpleNamespace:
+        worst = np.ones(4)
+        worst[3] = 1.0 if (divisions[needed] > 1).all() else -1.0
+        return SimpleNamespace(worst=worst, own=np.ones(4))
+
+    for needed in ([own[0]], list(range(n))):  # the chords of the cell are enough, or all are needed
+        monkeypatch.setattr(filler, "_placed", partial(placed_, needed=needed))
+        expected = ones.copy()
+        expected[own if len(needed) == 1 else needed] = 2
+        np.testing.assert_array_equal(filler.unfolded(guide, ones), expected)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..records import Float, Guide, Int, Model, QuadMesh
 from ..surfaces import Surfaces
+from .numbering import guide_chords
 from .pipeline import Placed, mesh_of, placed, poor_of, shown_divisions
 
 __all__ = ["Filler"]
@@ -43,6 +44,23 @@ class Filler:
     def poor_cells(self, guide: Guide, divisions: Int) -> tuple[Int, Int]:
         """Rows of the guide quads that are filled badly, and of those with an inverted fine quad."""
         return poor_of(self._placed(guide, shown_divisions(self.model, guide, divisions)))
+
+    def unfolded(self, guide: Guide, divisions: Int) -> Int:
+        """The divisions (c,), or two for one where cells fold at one: `poor_cells` has judged them at two at least."""
+        folded = self._folded(guide, divisions)
+        if not len(folded):
+            return divisions
+        more = np.maximum(divisions, shown_divisions(self.model, guide, divisions))
+        _, quad_edges, chord, _ = guide_chords(guide.quads)
+        few = divisions.copy()
+        own = np.unique(chord[quad_edges[folded]])
+        few[own] = more[own]
+        return more if len(self._folded(guide, few)) else few
+
+    def _folded(self, guide: Guide, divisions: Int) -> Int:
+        """Rows of the guide quads that are not inverted and have an inverted fine quad."""
+        work = self._placed(guide, divisions)
+        return np.flatnonzero((work.worst <= 0) & (work.own > 0))
 
     def fill(self, guide: Guide, divisions: Int) -> QuadMesh:
         """The final mesh.
