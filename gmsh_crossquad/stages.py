@@ -26,7 +26,8 @@ from .watch import Watch
 
 __all__ = ["StagesResult", "block_mesh"]
 
-GOOD_QUALITY = 0.02
+GOOD_QUALITY = 0.02  # least scaled Jacobian above which no other layout is tried
+TOLD_QUALITY = 0.1  # below which the user is told
 GOOD_FIT = 0.3
 MOST_WORK = 30_000
 MOST_WORK_CURVED = 20_000
@@ -199,7 +200,7 @@ class _Search:
         result, fit = laid.guide, curve_fit(laid.mesh)
         score = (result.quality > GOOD_QUALITY, fit < GOOD_FIT, result.quality)
         if self._best is None or score > self._best[0]:
-            doubts = [] if score[0] else [f"some cells are poor (scaled Jacobian {result.quality:.2g})"]
+            doubts = [] if result.quality >= TOLD_QUALITY else [f"some cells are poor (scaled Jacobian {result.quality:.2g})"]
             doubts += [] if score[1] else ["some edges on curves are much longer than those beside them"]
             notes = (*self._notes, *faces.notes, *result.notes, *laid.mesh.notes, *doubts)
             made = StagesResult(
