@@ -173,6 +173,8 @@ class Model:
         Gmsh tag of every CAD point in a named physical group with the group's name, also of points of no wanted face.
     face_names : tuple of tuple of str
         Names of the physical surfaces that hold each face; empty where nobody has read them.
+    face_groups : tuple of tuple of int
+        Tags of the physical surfaces that hold every face, named or not.
     ignored_curves : tuple of int
         Gmsh tags of the curves that are left out because faces go on smoothly across them.
     vertex_twins : tuple of (int, int)
@@ -190,6 +192,7 @@ class Model:
     notes: tuple[str, ...] = field(default=())
     point_names: tuple[tuple[int, str], ...] = ()
     face_names: tuple[tuple[str, ...], ...] = ()
+    face_groups: tuple[tuple[int, ...], ...] = ()
     ignored_curves: tuple[int, ...] = ()
     vertex_twins: tuple[tuple[int, int], ...] = ()
 

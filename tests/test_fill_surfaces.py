@@ -352,7 +352,7 @@ def test_a_small_round_face_may_be_coarse_unless_it_is_named() -> None:
     wide = replace(guide, points=more, quads=quads, quad_face=np.append(guide.quad_face, 1), chains=())
     fine = uniform(wide, 1)
     assert (followed(big, kinds, wide, fine) == fine).all()
-    named = replace(big, face_names=(("skin",), ()))
+    named = replace(big, face_groups=((1,), ()))
     assert np.count_nonzero(followed(named, kinds, wide, fine) > 1) == 9
 
 

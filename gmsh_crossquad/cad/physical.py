@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gmsh
 
-__all__ = ["group_names", "physical_points"]
+__all__ = ["group_names", "group_tags", "physical_points"]
 
 
 def physical_points() -> set[int]:
@@ -19,4 +19,13 @@ def group_names(dim: int) -> dict[int, list[str]]:
         name = gmsh.model.getPhysicalName(dim, group)
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group) if name else ():
             out.setdefault(abs(int(entity)), []).append(name)
+    return out
+
+
+def group_tags(dim: int) -> dict[int, list[int]]:
+    """Tags of the physical groups, with a name or without, that hold each entity of a dimension."""
+    out: dict[int, list[int]] = {}
+    for _, group in gmsh.model.getPhysicalGroups(dim):
+        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
+            out.setdefault(abs(int(entity)), []).append(int(group))
     return out

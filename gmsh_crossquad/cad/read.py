@@ -19,7 +19,7 @@ from .joints import Group, smooth_joints
 from .knots import untie
 from .loops import boundary_loops
 from .periodic import linked
-from .physical import group_names, physical_points
+from .physical import group_names, group_tags, physical_points
 from .plane import face_plane
 from .raw_curves import RawCurve, Vertices, degenerate, read_curve
 from .sample import refine
@@ -114,7 +114,7 @@ def read_model(options: MeshOptions) -> Model:
             faces.append(curved_face(f, bound, embed, points[f], curves, row, scale))
         else:
             faces.append(_face(f, bound, embed, points[f], curves, row, place, plane))
-    groups_of = group_names(2)
+    groups_of, in_groups = group_names(2), group_tags(2)
     asked = physical_points() | {vertices.tags[p] for f in tags for p in points[f]}
     asked |= {kept_tag for tag, kept_tag in twins.items() if tag in asked}
     twin_rows = [(tag, vertices.tags.index(kept_tag)) for tag, kept_tag in sorted(twins.items()) if kept_tag in vertices.tags]
@@ -130,6 +130,7 @@ def read_model(options: MeshOptions) -> Model:
         notes=_notes(kept, groups, len(twin_rows)),
         point_names=tuple((p, name) for p, names in group_names(0).items() for name in names),
         face_names=tuple(tuple(groups_of.get(f, ())) for f in tags),
+        face_groups=tuple(tuple(sorted({g for t in face.tags for g in in_groups.get(t, ())})) for face in faces),
         ignored_curves=tuple(sorted(c for group in groups for c in group.ignored)),
         vertex_twins=tuple(twin_rows),
     )

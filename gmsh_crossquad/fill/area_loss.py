@@ -92,9 +92,9 @@ def followed(model: Model, surfaces: Surfaces, guide: Guide, fine: Int) -> Int:
 
 def _groups(model: Model) -> Float:
     """(g, f) 1 where a face is in a group: the whole model, and every physical surface."""
-    names = sorted({name for face in model.face_names for name in face})
+    tags = sorted({tag for face in model.face_groups for tag in face})
     rows = [np.ones(len(model.faces))]
-    rows += [np.array([float(name in face) for face in model.face_names]) for name in names]
+    rows += [np.array([float(tag in face) for face in model.face_groups]) for tag in tags]
     return np.stack(rows)
 
 
