@@ -12,16 +12,6 @@ def physical_points() -> set[int]:
     return {int(p) for d, t in gmsh.model.getPhysicalGroups(0) for p in gmsh.model.getEntitiesForPhysicalGroup(d, t)}
 
 
-def group_names(dim: int) -> dict[int, list[str]]:
-    """Names of the physical groups that hold each entity of a dimension."""
-    out: dict[int, list[str]] = {}
-    for _, group in gmsh.model.getPhysicalGroups(dim):
-        name = gmsh.model.getPhysicalName(dim, group)
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group) if name else ():
-            out.setdefault(abs(int(entity)), []).append(name)
-    return out
-
-
 def group_tags(dim: int) -> dict[int, list[int]]:
     """Tags of the physical groups, with a name or without, that hold each entity of a dimension."""
     out: dict[int, list[int]] = {}
@@ -29,3 +19,10 @@ def group_tags(dim: int) -> dict[int, list[int]]:
         for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, group):
             out.setdefault(abs(int(entity)), []).append(int(group))
     return out
+
+
+def group_names(dim: int) -> dict[int, list[str]]:
+    """Names of the physical groups that hold each entity of a dimension."""
+    names = {group: gmsh.model.getPhysicalName(dim, group) for _, group in gmsh.model.getPhysicalGroups(dim)}
+    named = {entity: [names[g] for g in groups if names[g]] for entity, groups in group_tags(dim).items()}
+    return {entity: own for entity, own in named.items() if own}

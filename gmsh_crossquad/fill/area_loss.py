@@ -57,9 +57,10 @@ def followed(model: Model, surfaces: Surfaces, guide: Guide, fine: Int) -> Int:
     from scipy.sparse import coo_array, csr_array
 
     edges, quad_edges, chord, n = guide_chords(guide.quads)
-    losses = _losses(model, surfaces, guide, edges, quad_edges, chord, n)
+    curves = edges_on_curves(model, guide, edges)
+    losses = _losses(model, surfaces, guide, curves, edges, quad_edges, chord, n)
     free = np.ones(n, bool)
-    for curve, (row, _, _) in zip(model.curves, edges_on_curves(model, guide, edges)):
+    for curve, (row, _, _) in zip(model.curves, curves):
         if curve.spacing is not None:
             free[chord[row]] = False
     out = np.where(free, np.maximum(fine, np.ceil(losses.turning / STEEP - 1e-9)), fine).astype(np.int64)
@@ -98,10 +99,18 @@ def _groups(model: Model) -> Float:
     return np.stack(rows)
 
 
-def _losses(model: Model, surfaces: Surfaces, guide: Guide, edges: Int, quad_edges: Int, chord: Int, n: int) -> _Losses:
+def _losses(
+    model: Model,
+    surfaces: Surfaces,
+    guide: Guide,
+    curves: list[tuple[Int, Float, Float]],
+    edges: Int,
+    quad_edges: Int,
+    chord: Int,
+    n: int,
+) -> _Losses:
     diagonals = guide.points[guide.quads[:, 2:]] - guide.points[guide.quads[:, :2]]
     areas = 0.5 * np.linalg.norm(np.cross(diagonals[:, 0], diagonals[:, 1]), axis=1)
-    curves = edges_on_curves(model, guide, edges)
     bent, bent_face, bend = surface_turning(surfaces, guide, edges, quad_edges)
     turning = np.zeros(n)
     for row, _, turn in curves:
